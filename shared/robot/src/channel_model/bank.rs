@@ -4,7 +4,9 @@ use vigil_inference::logspace::log_sum_exp;
 
 use super::component::{Quantity, Target};
 use super::declared_faults::DeclaredFaults;
-use super::fault_kind::{DECLARED_KINDS, DRIVE_KINDS, FaultKind, SENSOR_KINDS};
+use super::fault_kind::{
+    DECLARED_KINDS, DRIVE_KINDS, FaultKind, GAIN_SD, SENSOR_KINDS, SHARE_SD, bias_sd,
+};
 use super::law::{BLOCKS, Change, Law, Row};
 use super::scatter::ScatterLaw;
 use super::window::{DELAY_BLOCKS, OFFSET, Window};
@@ -16,31 +18,24 @@ pub const KINDS_MAX: usize = SENSOR_KINDS.len();
 pub const IMPOSSIBLE: f64 = -700.0;
 
 /// Blocks of the window from which on a fault may have been there.
-const ONSETS: [usize; 6] = [0, 2, 4, 5, 6, 7];
+pub const ONSETS: [usize; 6] = [0, 2, 4, 5, 6, 7];
 /// The same of faults that show in several channels.
-const JOINT_ONSETS: [usize; 3] = [0, 4, 6];
-/// Deviation of a gain from one.
-const GAIN_SD: f64 = 1.0;
-/// Deviation of a drive's share that is lost.
-const SHARE_SD: f64 = 0.5;
-/// Deviation of a bias over the channel's usual size in motion.
-const BIAS_SD: f64 = 0.5;
-const BIAS_DEVIATIONS: f64 = 10.0;
+pub const JOINT_ONSETS: [usize; 3] = [0, 4, 6];
 /// Time in which a drift grows as large as a bias, s.
 const DRIFT_S: f64 = 4.0;
 /// Delays that are looked for, in blocks; one with a size of its own between them.
-const DELAYS: [f64; 4] = [0.5, 1.0, 2.0, DELAY_BLOCKS as f64];
+pub const DELAYS: [f64; 4] = [0.5, 1.0, 2.0, DELAY_BLOCKS as f64];
 /// Deviation of an erratic sensor's readings, relative to that of a whole one given all others.
-const ERRATIC: f64 = 6.0;
+pub const ERRATIC: f64 = 6.0;
 /// The value at which a sensor has frozen is one number more: its price in nats.
-const HELD: f64 = 2.0;
+pub const HELD: f64 = 2.0;
 /// Silence after which a channel is missing, s, if it was never silent for half as long, and how
 /// much that says.
 const MISSING_S: f64 = 1.0;
 const MISSING: f64 = 30.0;
 /// Deviations of a robot with which something is wrong that no single fault explains, relative to
 /// those of a healthy one.
-const UNKNOWN: f64 = 2.0;
+pub const UNKNOWN: f64 = 2.0;
 /// The same of the roughness.
 const UNKNOWN_NOISE: f64 = 3.0;
 
@@ -324,17 +319,14 @@ impl Bank {
         }
     }
 
-    /// A bias may be as large as what is measured, or as many deviations.
+    /// Deviation of a bias of a channel.
     fn bias_sd(&self, channel: usize) -> f64 {
         let unit = &self.window.unit[channel];
         let units = unit
             .iter()
             .fold(0.0, |sum, unit| sum + unit / BLOCKS as f64);
         let deviation = if units > 0.0 { 1.0 / units } else { 0.0 };
-        BIAS_SD
-            * self.channels[channel]
-                .usual
-                .hypot(BIAS_DEVIATIONS * deviation)
+        bias_sd(self.channels[channel].usual, deviation)
     }
 
     fn weigh_declared(&mut self, fault: usize) {

@@ -66,6 +66,22 @@ pub const DRIVE_KINDS: [FaultKind; 5] = [
 /// Kinds of evidence for a declared fault.
 pub const DECLARED_KINDS: [FaultKind; 2] = [FaultKind::Shift, FaultKind::Signature];
 
+/// Deviation of a gain from one, before anything is seen.
+pub const GAIN_SD: f64 = 1.0;
+/// Deviation of a drive's share that is lost, likewise.
+pub const SHARE_SD: f64 = 0.5;
+/// Deviation of a bias over the channel's usual size in motion, or over so many deviations of its
+/// residual.
+const BIAS_SD: f64 = 0.5;
+const BIAS_DEVIATIONS: f64 = 10.0;
+
+/// Deviation of a bias before anything is seen, in the channel's unit: it may be as large as what
+/// is usually measured, or as many deviations of the residual.
+#[must_use]
+pub fn bias_sd(usual: f64, deviation: f64) -> f64 {
+    BIAS_SD * usual.hypot(BIAS_DEVIATIONS * deviation)
+}
+
 impl FaultKind {
     /// The word for it and the unit of its size on the wire; `of`: what the sensor measures.
     #[must_use]

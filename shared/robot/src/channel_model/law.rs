@@ -306,6 +306,36 @@ impl Law {
         Change { b, a }
     }
 
+    /// `P s` of a signature, by channel. Its product with another one says how alike both are.
+    #[must_use]
+    pub fn weighed(&self, signature: &[Row]) -> Vec<Row> {
+        let mut out = vec![[0.0; BLOCKS]; self.channels];
+        for (direction, precision) in self.directions.iter().zip(&self.precision) {
+            let weighed = product(precision, &along(&direction.vector, signature));
+            for (share, row) in direction.vector.iter().zip(&mut out) {
+                let values = row.iter_mut().zip(weighed);
+                values.for_each(|(sum, value)| *sum += share * value);
+            }
+        }
+        out
+    }
+
+    /// What a channel's readings from `first` on say of two signatures that are `weighed`: so much
+    /// less is their product if they say nothing.
+    #[must_use]
+    pub fn hidden(&self, channel: usize, first: usize, [one, other]: [&Row; 2]) -> f64 {
+        -dot(&self.silence(channel, first, one), other)
+    }
+
+    /// What a channel whose readings say nothing from `first` on adds to a signature that is
+    /// `weighed`, so that the signature says nothing of these readings either.
+    #[must_use]
+    pub fn silence(&self, channel: usize, first: usize, weighed: &Row) -> Row {
+        let mut gradient = *weighed;
+        gradient[..first].fill(0.0);
+        product(&self.own_inverse[channel][first], &gradient).map(|value| -value)
+    }
+
     /// By how much the square lessens if a channel's readings from `first` on say nothing; the
     /// blocks from there are expected at `z - deviation`.
     #[must_use]
@@ -326,9 +356,15 @@ impl Law {
     /// and its density lower by the exponent of `penalty`.
     #[must_use]
     pub fn log_ratio(&self, less: f64, penalty: f64) -> f64 {
-        let least = self.square - less.min(self.square);
+        self.log_ratio_at(self.square, less) - penalty
+    }
+
+    /// The same of a window with this square, without a penalty.
+    #[must_use]
+    pub fn log_ratio_at(&self, square: f64, less: f64) -> f64 {
+        let least = square - less.min(square);
         let half = 0.5 * (FREEDOM + self.values() as f64);
-        half * ((FREEDOM + self.square) / (FREEDOM + least)).ln() - penalty
+        half * ((FREEDOM + square) / (FREEDOM + least)).ln()
     }
 
     /// The same if all deviations were larger by a factor.

@@ -273,13 +273,8 @@ impl Monitor {
     }
 
     fn sum_up(&mut self) {
-        let shares = 1.0
-            + self
-                .watched
-                .iter()
-                .filter(|watched| watched.is_seen)
-                .count() as f64;
-        let prior = (FAULT_RATE_1_H / 3600.0 * BLOCK_S * BLOCKS as f64 / shares).ln();
+        let seen = self.watched.iter().filter(|watched| watched.is_seen);
+        let prior = component_prior(seen.count());
         // Log-odds by component and class, before and after tempering.
         let mut raw = [[IMPOSSIBLE; Class::ALL.len()]; COMPONENTS_MAX];
         let mut certain = [IMPOSSIBLE; COMPONENTS_MAX];
@@ -391,6 +386,14 @@ impl Monitor {
         self.report.channels = channels.map(|value| (value + prior).max(IMPOSSIBLE));
         self.report.gains = channels.map(|value| value * per_observation);
     }
+}
+
+/// Log-odds at [`FAULT_RATE_1_H`] that a fault of one of so many components has begun within a
+/// window; as much is kept for a fault of none of them.
+#[must_use]
+pub fn component_prior(components: usize) -> f64 {
+    let shares = 1.0 + components as f64;
+    (FAULT_RATE_1_H / 3600.0 * BLOCK_S * BLOCKS as f64 / shares).ln()
 }
 
 /// The channels at these places of a description, with their components.

@@ -216,6 +216,9 @@ fn the_law_says_what_its_whole_covariance_says() {
         let Change { b, a } = law.joint_change(&rows(&s), None);
         near(b, s.dot(&(&precision * &z)));
         near(a, s.dot(&(&precision * &s)));
+        let weighed = law.weighed(&rows(&s));
+        let product: f64 = rows(&z).iter().zip(&weighed).map(|(a, b)| dot(a, b)).sum();
+        near(product, s.dot(&(&precision * &z)));
         // Without the first channel: under the law of the others alone.
         let Change { b, a } = law.joint_change(&rows(&without_first(&s)), Some(0));
         let others = 2 * BLOCKS;
@@ -226,6 +229,16 @@ fn the_law_says_what_its_whole_covariance_says() {
         let (z_others, s_others) = (z.rows(BLOCKS, others), s.rows(BLOCKS, others));
         near(b, s_others.dot(&(&of_others * z_others)));
         near(a, s_others.dot(&(&of_others * s_others)));
+        let of_z = law.weighed(&rows(&z));
+        let hidden = law.hidden(0, 0, [&weighed[0], &of_z[0]]);
+        near(product - hidden, s_others.dot(&(&of_others * z_others)));
+        // Completed so that they say nothing of the first.
+        let mut silent = rows(&s);
+        let added = law.silence(0, 0, &weighed[0]);
+        silent[0].iter_mut().zip(added).for_each(|(a, b)| *a += b);
+        law.weighed(&silent)[0]
+            .into_iter()
+            .for_each(|value| near(value, 0.0));
         for channel in 0..3 {
             let changes = law.change(channel, &rows(&s)[channel]);
             for (first, Change { b, a }) in changes.into_iter().enumerate() {
@@ -249,6 +262,10 @@ fn the_law_says_what_its_whole_covariance_says() {
             }
         }
     }
+}
+
+fn dot(a: &Row, b: &Row) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn without_first(values: &DVector<f64>) -> DVector<f64> {

@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde::Serialize;
-use vigil_blocks::SensorFrame;
 use vigil_evaluation::scoring::Score;
 use vigil_learning::channel_learning::{self, LabelledRun, Report};
 use vigil_learning::split::split_runs;
@@ -16,6 +15,7 @@ use vigil_robot::learned::model::Provenance;
 
 use super::cross_validation;
 use super::files::{file_name, write_whole};
+use super::labelled_runs::{healthy_part, labelled_runs};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
@@ -136,66 +136,26 @@ fn held_out(task: &Task<'_>) -> Vec<u32> {
 
 /// Learns from the runs that are not held out.
 pub(super) fn learn(task: &Task<'_>, held_out: &[u32]) -> Result<(Model, Report), CommandError> {
-    let labels = labels(task)?;
-    let healthy: Vec<Run> = task.runs.iter().map(|run| healthy(run, &labels)).collect();
+    let faulty = match task.labels {
+        Some(labels) => labelled_runs(task.runs, labels, task.robot)?,
+        None => Vec::new(),
+    };
+    let healthy = task.runs.iter().map(|run| healthy_part(run, &faulty));
+    let healthy: Vec<Run> = healthy.collect();
     let is_learned = |label: &LabelledRun<'_>| !held_out.contains(&label.run.id);
-    let labelled: Vec<LabelledRun<'_>> = labels.into_iter().filter(is_learned).collect();
+    let labelled: Vec<LabelledRun<'_>> = faulty.into_iter().filter(is_learned).collect();
     channel_learning::learn(&healthy, held_out, task.until_s, task.robot, &labelled)
         .map_err(|error| CommandError::usage(format!("{}: {error}", task.frames.display())))
 }
 
-/// The runs with a fault.
-fn labels<'a>(task: &Task<'a>) -> Result<Vec<LabelledRun<'a>>, CommandError> {
-    let Some(labels) = task.labels else {
-        return Ok(Vec::new());
-    };
-    let mut found = Vec::new();
-    for run in task.runs {
-        let id = run.id;
-        let Some(label) = labels.iter().find(|label| label.run == id) else {
-            let message = format!("there is no label of run {id}");
-            return Err(CommandError::usage(message));
-        };
-        let Some(onset_s) = label.onset_s else {
-            continue;
-        };
-        if !task
-            .robot
-            .fault
-            .iter()
-            .any(|fault| fault.name == label.mode)
-        {
-            let declared = task.robot.fault.iter().map(|fault| fault.name.as_str());
-            let declared: Vec<&str> = declared.collect();
-            let message = format!(
-                "run {id} has the mode '{}', which is no [[fault]] of {}: it declares {}",
-                label.mode,
-                task.robot.name,
-                if declared.is_empty() {
-                    "none".to_owned()
-                } else {
-                    declared.join(", ")
-                }
-            );
-            return Err(CommandError::usage(message));
-        }
-        found.push(LabelledRun {
-            run,
-            fault: &label.mode,
-            onset_s,
-            group: &label.group,
-        });
-    }
-    Ok(found)
-}
+#[cfg(test)]
+mod tests {
+    use vigil_diagnosis::detect::Settings;
+    use vigil_learning::channel_learning::FALSE_ALARM_INTERVAL_H;
 
-/// A run up to its fault.
-fn healthy(run: &Run, labels: &[LabelledRun<'_>]) -> Run {
-    let label = labels.iter().find(|label| label.run.id == run.id);
-    let until_s = label.map_or(f64::INFINITY, |label| label.onset_s);
-    let is_before = |frame: &&SensorFrame| (frame.header.t_capture_ns as f64) * 1e-9 < until_s;
-    Run {
-        id: run.id,
-        frames: run.frames.iter().take_while(is_before).copied().collect(),
+    #[test]
+    fn the_report_is_of_the_detectors_own_interval_between_false_alarms() {
+        let settings = Settings::default();
+        assert_eq!(FALSE_ALARM_INTERVAL_H, settings.false_alarm_interval_h);
     }
 }

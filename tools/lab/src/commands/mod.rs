@@ -6,6 +6,7 @@ pub mod evaluate;
 mod files;
 pub mod import;
 pub mod init;
+mod labelled_runs;
 pub mod learn;
 mod learn_channels;
 mod offline;

@@ -16,12 +16,13 @@ fn page() -> String {
     fs::read_to_string(root().join("docs/your-robot.md")).unwrap()
 }
 
-/// Every command of the page's blocks that needs no publisher, its program first; the file of
-/// labels is none.
+/// Every command of the page's blocks that needs no publisher, its program first.
 fn commands(page: &str) -> Vec<Vec<String>> {
     let blocks = page.split("```").skip(1).step_by(2);
-    let needs_no_publisher = |block: &&str| !block.starts_with("sh not run: needs a publisher");
-    let blocks = blocks.filter(needs_no_publisher);
+    let is_followed = |block: &&str| {
+        block.starts_with("sh") && !block.starts_with("sh not run: needs a publisher")
+    };
+    let blocks = blocks.filter(is_followed);
     // The first line of a block says what the block is.
     let lines = blocks.flat_map(|block| block.lines().skip(1));
     let lines = lines.map(str::trim);
@@ -137,16 +138,37 @@ fn check_step(command: &[String], output: &Output) {
             printed.contains("of each run    the first 60 s"),
             "{printed}"
         ),
-        ("learn", _) => assert!(
-            errors.contains("less than 600 s"),
-            "a short log is told: {errors}"
-        ),
+        ("learn", _) => {
+            assert!(
+                errors.contains("less than 600 s"),
+                "a short log is told: {errors}"
+            );
+            check_isolability(&printed);
+        }
         ("evaluate", _) => {
             let score: Value = serde_json::from_slice(&output.stdout).unwrap();
             assert_eq!(score["false_alarms"]["alarms"], 0);
         }
         ("check", _) => assert!(printed.contains("kobuki"), "{printed}"),
         _ => {}
+    }
+}
+
+/// The lines of the page are among those printed, but for their last digits: every word is.
+fn check_isolability(printed: &str) {
+    let page = page();
+    let example = page
+        .split("```")
+        .find(|block| block.contains("faults put into"));
+    let words = |text: &str| -> Vec<String> {
+        let words = text.split_whitespace();
+        let is_name = |word: &&str| word.chars().all(|c| c.is_alphabetic() || c == '_');
+        words.filter(is_name).map(str::to_owned).collect()
+    };
+    let lines: Vec<Vec<String>> = printed.lines().map(words).collect();
+    for line in example.unwrap().trim().lines().map(words) {
+        let found = lines.iter().any(|of| of.starts_with(&line));
+        assert!(found, "{line:?} is not printed: {printed}");
     }
 }
 

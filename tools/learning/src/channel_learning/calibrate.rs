@@ -7,8 +7,8 @@ use vigil_robot::learned::calibration::SLOPE_UNKNOWN;
 use vigil_robot::learned::channels::Channels;
 use vigil_robot::learned::{Calibration, Form};
 
-use super::joint::CONTEXT_BLOCKS;
 use super::record::Record;
+use super::unseen::CONTEXT_BLOCKS;
 use crate::bounds::Bounds;
 use crate::learning::bounds::SLOPE_LIMIT;
 use crate::maxima::Maxima;

@@ -1,7 +1,6 @@
 //! The joint law of the residuals, and that of their roughness.
 
 use nalgebra::{DMatrix, DVector};
-use vigil_robot::channel_model::channel::commands;
 use vigil_robot::channel_model::directions::directions;
 use vigil_robot::channel_model::law::BLOCKS;
 use vigil_robot::channel_model::scatter::{Scatter, log_roughness};
@@ -10,13 +9,12 @@ use vigil_robot::channel_model::{Model, Scales};
 
 use super::noise::counts;
 use super::record::Record;
+use super::unseen;
 
 /// Observations of a block that are not independent of the others are worth so much less.
 const CORRELATED: f64 = 4.0;
 /// Most of a channel's variance that the others may explain.
 const SHARED_MAX: f64 = 0.9;
-/// Blocks before a part in which a run's context is learned.
-pub(super) const CONTEXT_BLOCKS: usize = 60;
 /// Least variance of a block's whitened mean.
 const VARIANCE_MIN: f64 = 1e-6;
 /// Least deviation of a logarithm of the roughness: no two grounds are equally rough.
@@ -33,8 +31,9 @@ struct Moments {
     windows: f64,
 }
 
-/// Fits both laws to the residuals that `models` of the parts have on what they have not seen.
-pub(super) fn fit(model: &mut Model, models: &[Model], records: &[Record], scales: &Scales) {
+/// Fits both laws to the residuals that `models` of the parts have on what they have not seen. All
+/// take them.
+pub(super) fn fit(model: &mut Model, models: &mut [Model], records: &[Record], scales: &Scales) {
     let n = model.channel.len();
     let mut moments = Moments {
         n,
@@ -43,11 +42,26 @@ pub(super) fn fit(model: &mut Model, models: &[Model], records: &[Record], scale
         rough: Vec::new(),
         windows: 0.0,
     };
-    for (fold, seen) in models.iter().enumerate() {
-        let used = seen.channel.iter().cloned().enumerate().collect();
-        let mut window = Window::new(used, scales.clone(), model.interval_s);
-        moments.take_fold((&mut window, scales.lags), (seen, fold), records);
-    }
+    // Windows of the roughness hardly overlap, of one part of one record.
+    let (mut rough_in, mut part) = (0, None);
+    unseen::windows(models, records, scales, |sight| {
+        let record = &records[sight.record];
+        if !counts(&record.histories[sight.newest], scales.lags) {
+            return;
+        }
+        let here = Some((record.folds[sight.newest], sight.record));
+        let is_new = std::mem::replace(&mut part, here) != here;
+        let per_block = sight.window.per_block();
+        moments.windows += 1.0 / per_block as f64;
+        moments.take_products(sight.window);
+        if is_new || rough_in == 0 {
+            rough_in = per_block * BLOCKS / 4;
+            let rough = sight.window.roughness[..n].iter();
+            let rough = rough.map(|&found| log_roughness(found)).collect();
+            moments.rough.push(rough);
+        }
+        rough_in -= 1;
+    });
     let independent = moments.windows / CORRELATED;
     let shrink = independent / (n as f64 + 1.0 + independent);
     let shrink = shrink.min(SHARED_MAX);
@@ -56,6 +70,10 @@ pub(super) fn fit(model: &mut Model, models: &[Model], records: &[Record], scale
         .collect();
     model.direction = directions(&covariances);
     model.scatter = moments.scatter(shrink);
+    for part in models {
+        part.direction.clone_from(&model.direction);
+        part.scatter.clone_from(&model.scatter);
+    }
 }
 
 /// The covariance itself, or nearest to it one without a negative variance in any direction: sums
@@ -70,47 +88,6 @@ fn whole(covariance: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 impl Moments {
-    fn take_fold(
-        &mut self,
-        (window, lags): (&mut Window, usize),
-        (model, fold): (&Model, usize),
-        records: &[Record],
-    ) {
-        let per_block = window.per_block();
-        for record in records {
-            let is_near = |k: usize| {
-                let last = (k + CONTEXT_BLOCKS * per_block).min(record.folds.len() - 1);
-                record.folds[k..=last].contains(&fold)
-            };
-            window.reset();
-            let mut rough_in = 0;
-            for (k, history) in record.histories.iter().enumerate() {
-                if history.ago(lags).is_none() {
-                    window.clear();
-                    continue;
-                }
-                if !is_near(k) {
-                    window.reset();
-                    continue;
-                }
-                window.push(history, &commands(history), (model.widening(history), 0));
-                if record.folds[k] != fold || !counts(history, lags) {
-                    continue;
-                }
-                self.windows += 1.0 / per_block as f64;
-                self.take_products(window);
-                // Windows that hardly overlap.
-                if rough_in == 0 {
-                    rough_in = per_block * BLOCKS / 4;
-                    let rough = window.roughness[..self.n].iter();
-                    self.rough
-                        .push(rough.map(|&found| log_roughness(found)).collect());
-                }
-                rough_in -= 1;
-            }
-        }
-    }
-
     fn take_products(&mut self, window: &Window) {
         let n = self.n;
         for (lag, (products, counts)) in self.products.iter_mut().zip(&mut self.counts).enumerate()

@@ -19,8 +19,8 @@ use vigil_robot::channel_model::signature::{
 use vigil_robot::channel_model::window::Window;
 use vigil_robot::channel_model::{Model, Scales};
 
-use super::joint::CONTEXT_BLOCKS;
 use super::record::{self, Record};
+use super::unseen;
 
 /// Ages of a fault, s, over which it looks alike: it has hardly begun, it grows, it stands, and
 /// controllers answer it. Chosen: the last ends where the robot is no longer the one that was
@@ -126,6 +126,7 @@ pub(super) fn fit(
 }
 
 /// The means of a healthy robot, in each run.
+#[derive(Default)]
 struct HealthyRun {
     dt_s: Vec<f64>,
     means: Vec<Means>,
@@ -140,40 +141,26 @@ struct Health {
 
 /// Each part of the log seen through the model that has not seen it.
 fn healthy_means(models: &[Model], records: &[Record], scales: &Scales) -> Vec<HealthyRun> {
-    let mut out = Vec::new();
-    for (fold, model) in models.iter().enumerate() {
-        let n = model.channel.len();
-        let used = model.channel.iter().cloned().enumerate().collect();
-        let mut window = Window::new(used, scales.clone(), model.interval_s);
-        let ahead = CONTEXT_BLOCKS * window.per_block();
-        for record in records {
-            window.reset();
-            let mut run = HealthyRun {
-                dt_s: Vec::new(),
-                means: Vec::new(),
-            };
-            for (k, history) in record.histories.iter().enumerate() {
-                let last = (k + ahead).min(record.folds.len() - 1);
-                let is_near = record.folds[k..=last].contains(&fold);
-                let Some(now) = history.ago(0).filter(|_| is_near) else {
-                    window.reset();
-                    continue;
-                };
-                if history.ago(scales.lags).is_none() {
-                    window.clear();
-                    continue;
-                }
-                window.push(history, &commands(history), (model.widening(history), 0));
-                if record.folds[k] == fold && now.moving && window.whole_blocks() == BLOCKS {
-                    run.dt_s.push(now.dt_s);
-                    run.means.push(means(&window, n));
-                }
-            }
-            if !run.means.is_empty() {
-                out.push(run);
-            }
+    let mut out: Vec<HealthyRun> = Vec::new();
+    let mut part = None;
+    unseen::windows(models, records, scales, |sight| {
+        let record = &records[sight.record];
+        let Some(now) = record.histories[sight.newest].ago(0) else {
+            return;
+        };
+        if !now.moving || sight.window.whole_blocks() < BLOCKS {
+            return;
         }
-    }
+        let fold = record.folds[sight.newest];
+        if part.replace((sight.record, fold)) != Some((sight.record, fold)) {
+            out.push(HealthyRun::default());
+        }
+        let channels = models[fold].channel.len();
+        if let Some(run) = out.last_mut() {
+            run.dt_s.push(now.dt_s);
+            run.means.push(means(sight.window, channels));
+        }
+    });
     out
 }
 

@@ -8,6 +8,7 @@
 mod calibrate;
 mod coverage;
 mod excitation;
+mod isolability;
 mod joint;
 mod labelled;
 mod noise;
@@ -16,6 +17,7 @@ mod regression;
 mod report;
 mod terms;
 mod told;
+mod unseen;
 mod view;
 
 use vigil_recording::frames::Run;
@@ -31,6 +33,7 @@ use vigil_robot::learned::model::Provenance;
 
 use crate::data_hash::data_hash;
 use crate::plausibility::{self, RunCheck, RunDoubt};
+pub use isolability::{FALSE_ALARM_INTERVAL_H, Isolability};
 pub use labelled::{FaultFit, LabelledRun};
 use record::{FOLDS, Record};
 pub use report::{ChannelFit, Report};
@@ -179,18 +182,20 @@ pub fn learn(
             part.channel.push(channel);
         }
     }
-    joint::fit(&mut model, &models, &records, &scales);
-    for part in &mut models {
-        part.direction.clone_from(&model.direction);
-        part.scatter.clone_from(&model.scatter);
-    }
-    let told = labelled::fit(&mut model, (&models, &records), labelled, (robot, &scales));
+    joint::fit(&mut model, &mut models, &records, &scales);
+    report.faults = labelled::fit(&mut model, (&models, &records), labelled, (robot, &scales));
     for part in &mut models {
         part.signatures.clone_from(&model.signatures);
     }
-    report.faults = told;
     calibrate::fit(&mut model, &mut models, &records, robot);
     calibrate::tell(&mut report.bounds, &model);
+    report.isolability = isolability::report(&isolability::Task {
+        model: &model,
+        models: &models,
+        records: &records,
+        scales: &scales,
+        robot,
+    });
     report.finish(&model);
     Ok((model.sealed(), report))
 }

@@ -6,6 +6,7 @@ use serde::Serialize;
 use vigil_robot::channel_model::{Channel, Model, Term};
 
 use super::LONG_ENOUGH_S;
+use super::isolability::Isolability;
 use super::labelled::FaultFit;
 use super::terms::word;
 use crate::bounds::Bounds;
@@ -43,6 +44,8 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// Numbers of the model that stand on a bound set by hand.
     pub bounds: Bounds,
+    /// Which faults are detected and told apart; none if no window of the log tells.
+    pub isolability: Option<Isolability>,
 }
 
 impl Report {
@@ -84,6 +87,7 @@ impl Report {
             faults: Vec::new(),
             warnings,
             bounds: Bounds::default(),
+            isolability: None,
         }
     }
 
@@ -184,6 +188,8 @@ impl fmt::Display for Report {
         if !lines.is_empty() {
             writeln!(f)?;
         }
-        lines.iter().try_for_each(|line| writeln!(f, "{line}"))
+        lines.iter().try_for_each(|line| writeln!(f, "{line}"))?;
+        let mut isolability = self.isolability.iter();
+        isolability.try_for_each(|found| write!(f, "\n{found}"))
     }
 }

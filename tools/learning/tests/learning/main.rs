@@ -5,6 +5,7 @@
 mod channel_learning;
 mod channel_sensing;
 mod declared_faults;
+mod isolability;
 mod learning;
 mod refusals;
 mod rover;

@@ -1,0 +1,64 @@
+//! Runs with the faults that a robot's description declares, and what is healthy of them.
+
+use vigil_blocks::SensorFrame;
+use vigil_learning::channel_learning::LabelledRun;
+use vigil_recording::frames::Run;
+use vigil_recording::labels::Label;
+use vigil_robot::Description;
+use vigil_terminal::CommandError;
+
+/// The runs that are labelled with a fault.
+///
+/// # Errors
+/// A run without a label, or with that of a fault that `robot` does not declare.
+pub(super) fn labelled_runs<'a>(
+    runs: &'a [Run],
+    labels: &'a [Label],
+    robot: &Description,
+) -> Result<Vec<LabelledRun<'a>>, CommandError> {
+    let mut found = Vec::new();
+    for run in runs {
+        let id = run.id;
+        let Some(label) = labels.iter().find(|label| label.run == id) else {
+            let message = format!("there is no label of run {id}");
+            return Err(CommandError::usage(message));
+        };
+        let Some(onset_s) = label.onset_s else {
+            continue;
+        };
+        let declared: Vec<&str> = robot
+            .fault
+            .iter()
+            .map(|fault| fault.name.as_str())
+            .collect();
+        if !declared.contains(&label.mode.as_str()) {
+            let declared = match declared[..] {
+                [] => "none".to_owned(),
+                _ => declared.join(", "),
+            };
+            let message = format!(
+                "run {id} has the mode '{}', which is no [[fault]] of {}: it declares {declared}",
+                label.mode, robot.name,
+            );
+            return Err(CommandError::usage(message));
+        }
+        found.push(LabelledRun {
+            run,
+            fault: &label.mode,
+            onset_s,
+            group: &label.group,
+        });
+    }
+    Ok(found)
+}
+
+/// A run up to its fault.
+pub(super) fn healthy_part(run: &Run, faulty: &[LabelledRun<'_>]) -> Run {
+    let label = faulty.iter().find(|label| label.run.id == run.id);
+    let until_s = label.map_or(f64::INFINITY, |label| label.onset_s);
+    let is_before = |frame: &&SensorFrame| (frame.header.t_capture_ns as f64) * 1e-9 < until_s;
+    Run {
+        id: run.id,
+        frames: run.frames.iter().take_while(is_before).copied().collect(),
+    }
+}
