@@ -26,6 +26,8 @@ pub struct Channel {
     pub is_optional: bool,
     /// Largest magnitude that it can measure, in its unit; none: any finite number.
     pub limit: Option<f64>,
+    /// What it comes back to the same after, in its unit, if it is an angle.
+    pub period: Option<f64>,
     /// Standard deviation of its noise per sample, if it is declared.
     pub noise: Option<f64>,
     /// Tolerance, if it is declared.
@@ -41,6 +43,7 @@ impl Channel {
             unit: unit.to_owned(),
             is_optional: false,
             limit: None,
+            period: None,
             noise: None,
             tolerance: None,
         }
@@ -49,6 +52,7 @@ impl Channel {
     fn further(further: &FurtherChannel) -> Self {
         Self {
             limit: further.limit,
+            period: further.period,
             noise: further.noise,
             tolerance: further.tolerance,
             ..Self::new(further.name.clone(), further.role, &further.unit)

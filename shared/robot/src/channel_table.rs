@@ -55,6 +55,11 @@ pub struct FurtherChannel {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub noise: Option<f64>,
+    /// What it comes back to the same after, in that unit: 360 for a heading error in degrees. Its
+    /// readings then count within half of that on either side of 0; left out: it is no angle.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub period: Option<f64>,
     /// How far a healthy robot may depart from its model in it, in that unit; left out: learned.
     #[serde(default)]
     #[schemars(range(min = 0))]

@@ -52,6 +52,8 @@ pub struct Target {
     pub wheel: Option<usize>,
     /// Largest magnitude that it can have.
     pub largest: f64,
+    /// What it comes back to the same after, if it is an angle.
+    pub period: Option<f64>,
 }
 
 /// Name of the component of a pose.
@@ -92,6 +94,7 @@ fn predicted(robot: &Description) -> Vec<Target> {
             place: CHANNELS,
             wheel: None,
             largest: f64::INFINITY,
+            period: None,
         }));
     }
     let limits = &robot.limits;
@@ -119,6 +122,7 @@ fn predicted(robot: &Description) -> Vec<Target> {
             place,
             wheel: channel.wheel,
             largest,
+            period: channel.period,
         });
     }
     out

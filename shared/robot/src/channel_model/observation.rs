@@ -115,24 +115,33 @@ fn smoothed(last: Option<&Observation>, now: &Observation) -> [[f64; AXES]; SMOO
     })
 }
 
-/// Sum of the readings of one channel.
+/// Sum of the readings of one channel; of an angle each is taken next to the first.
 #[derive(Debug, Clone, Copy, Default)]
 struct Mean {
+    first: f64,
     sum: f64,
     count: u32,
 }
 
 impl Mean {
-    fn push(&mut self, value: f64) {
-        self.sum += value;
+    fn push(&mut self, value: f64, period: Option<f64>) {
+        if self.count == 0 {
+            self.first = value;
+        }
+        self.sum += self.first + within(value - self.first, period);
         self.count += 1;
     }
 
-    fn take(&mut self) -> Option<f64> {
+    fn take(&mut self, period: Option<f64>) -> Option<f64> {
         let count = std::mem::take(&mut self.count);
         let sum = std::mem::take(&mut self.sum);
-        (count > 0).then(|| sum / f64::from(count))
+        (count > 0).then(|| within(sum / f64::from(count), period))
     }
+}
+
+/// A value, if it is an angle within half a period of 0.
+fn within(value: f64, period: Option<f64>) -> f64 {
+    period.map_or(value, |period| value - period * (value / period).round())
 }
 
 /// Builds observations from frames.
@@ -255,18 +264,19 @@ impl Observer {
     /// Adds a frame's readings; true if one was refused.
     fn collect(&mut self, frame: &SensorFrame) -> bool {
         let mut invalid = false;
-        let mut push = |mean: &mut Mean, value: Option<f64>, largest: f64| match value {
-            Some(value) if value.abs() <= largest => mean.push(value),
+        let mut push = |mean: &mut Mean, value: Option<f64>, (largest, period)| match value {
+            Some(value) if value.abs() <= largest => mean.push(value, period),
             Some(_) => invalid = true,
             None => {}
         };
         for (i, axis) in self.robot.command.iter().enumerate().take(AXES) {
             let largest = BEYOND_LIMITS * axis.limit;
-            push(&mut self.command[i], frame.commanded(i), largest);
+            push(&mut self.command[i], frame.commanded(i), (largest, None));
         }
         for (target, mean) in self.targets.iter().zip(&mut self.means) {
             if target.place < CHANNELS {
-                push(mean, frame.measured(target.place), target.largest);
+                let value = frame.measured(target.place);
+                push(mean, value, (target.largest, target.period));
             }
         }
         if let Some(pose) = self.map.pose(frame) {
@@ -286,7 +296,7 @@ impl Observer {
         };
         for (i, mean) in self.command.iter_mut().enumerate() {
             let before = last.map_or(0.0, |last| last.command[i]);
-            now.command[i] = mean.take().unwrap_or(before);
+            now.command[i] = mean.take(None).unwrap_or(before);
         }
         now.smoothed = smoothed(last.as_ref(), &now);
         let moved = self.moved();
@@ -297,7 +307,7 @@ impl Observer {
                 Quantity::Forward => moved.map(|moved| moved[0] / now.dt_s),
                 Quantity::Lateral => moved.map(|moved| moved[1] / now.dt_s),
                 Quantity::Turn => moved.map(|moved| moved[2] / now.dt_s),
-                _ => self.means[i].take(),
+                _ => self.means[i].take(target.period),
             };
             let rate = now.values[i].filter(|_| target.quantity == Quantity::WheelRate);
             rolls |= rate.is_some_and(|rate| rate.abs() * self.robot.wheel_radius_m > standing_m_s);
