@@ -2,8 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::description::Description;
-use crate::description::Kinematics;
+use super::wheels::WheelChannel;
+use crate::description::{Description, Kinematics};
 
 /// Kind of a finding. The value is its code in events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,7 +21,7 @@ pub enum FindingKind {
     Rates = 5,
     /// This wheel's rate has the other sign.
     RateSign = 6,
-    /// This wheel and the one opposite turn as each other should.
+    /// This wheel's channel and that of the wheel `value` read each other's rate.
     Sides = 7,
     /// This wheel's steering angle has the other sign.
     SteerSign = 8,
@@ -29,10 +29,16 @@ pub enum FindingKind {
     Late = 9,
     /// Frames come so many times as often as the graph's rate says.
     Rate = 10,
+    /// This wheel's channel reads the rate of the wheel `value`.
+    RateOrder = 11,
+    /// The steering angles of this wheel and of the wheel `value` are exchanged.
+    SteerSides = 12,
+    /// This wheel's channel reads the steering angle of the wheel `value`.
+    SteerOrder = 13,
 }
 
 impl FindingKind {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 13] = [
         Self::Travel,
         Self::Heading,
         Self::Turn,
@@ -43,6 +49,9 @@ impl FindingKind {
         Self::SteerSign,
         Self::Late,
         Self::Rate,
+        Self::RateOrder,
+        Self::SteerSides,
+        Self::SteerOrder,
     ];
 
     /// True if it hides faults: the whole channel has another meaning. A single wheel does not: it
@@ -53,6 +62,16 @@ impl FindingKind {
             self,
             Self::Travel | Self::Heading | Self::Turn | Self::Gyro | Self::Rates
         )
+    }
+
+    /// Of channels that read other wheels: two that are exchanged, or one of several.
+    pub(super) const fn order(channel: WheelChannel, is_exchange: bool) -> Self {
+        match (channel, is_exchange) {
+            (WheelChannel::Rate, true) => Self::Sides,
+            (WheelChannel::Rate, false) => Self::RateOrder,
+            (WheelChannel::Steer, true) => Self::SteerSides,
+            (WheelChannel::Steer, false) => Self::SteerOrder,
+        }
     }
 }
 
@@ -91,8 +110,12 @@ impl Finding {
     /// In words, for the author of the publisher.
     #[must_use]
     pub fn text(&self, robot: &Description) -> String {
-        let wheel = self.wheel.and_then(|wheel| robot.wheels.get(wheel));
-        let wheel = wheel.map_or("?", |wheel| wheel.name.as_str());
+        let name = |place: Option<usize>| {
+            let wheel = place.and_then(|place| robot.wheels.get(place));
+            wheel.map_or("?", |wheel| wheel.name.as_str())
+        };
+        // An order's value is a wheel's place.
+        let (wheel, other) = (name(self.wheel), name(Some(self.value.max(0.0) as usize)));
         let turn = turning(robot);
         let v = self.value;
         let are_they = |units| unit(v, "are they", units);
@@ -128,9 +151,14 @@ impl Finding {
             ),
             FindingKind::RateSign => format!("signs: enc_{wheel} has the other sign"),
             FindingKind::Sides => format!(
-                "sides: enc_{wheel} and the wheel opposite turn as each other should: are they \
-                 exchanged, or is {turn} positive to the right?"
+                "order: enc_{wheel} and enc_{other} fit when exchanged{}",
+                or_turned(robot, turn)
             ),
+            FindingKind::RateOrder => format!("order: enc_{wheel} fits as enc_{other}"),
+            FindingKind::SteerSides => {
+                format!("order: steer_{wheel} and steer_{other} fit when exchanged")
+            }
+            FindingKind::SteerOrder => format!("order: steer_{wheel} fits as steer_{other}"),
             FindingKind::SteerSign => {
                 format!("signs: steer_{wheel} has the other sign, or is another wheel's")
             }
@@ -141,6 +169,14 @@ impl Finding {
             ),
             FindingKind::Rate => format!("rate: frames come at {v:.2} times the graph's rate"),
         }
+    }
+}
+
+/// Sides are exchanged alike by a command that turns the other way.
+fn or_turned(robot: &Description, turn: &str) -> String {
+    match robot.kinematics {
+        Kinematics::Omni3 | Kinematics::None => String::new(),
+        _ => format!("; or is {turn} positive to the right?"),
     }
 }
 

@@ -3,21 +3,27 @@
 //! A healthy robot roughly follows its command. If it moves a thousand times as far or turns the
 //! other way, a field holds another unit or sign. Each test sums measured against commanded motion
 //! from the first motion on; noise and ground leave the ratio near 1, and a finding needs a ratio
-//! that neither ground nor a fault explains. A test ends as soon as the motion excites it: straight
-//! driving shows nothing of turns. [`PublisherCheck::scope`] names the tests that have not
+//! that neither ground nor a fault explains. Wheels are told apart by what each should read: the
+//! order of the channels that fits best is theirs. A test ends as soon as the motion excites it:
+//! straight driving shows nothing of turns. [`PublisherCheck::scope`] names the tests that have not
 //! ended. Once all have, a frame costs nothing more.
 
 mod finding;
+mod order;
 mod pose;
+mod regression;
+mod scope;
 mod wheels;
 
 use vigil_blocks::SensorFrame;
 
 use crate::channel_map::ChannelMap;
-use crate::description::Description;
+use crate::description::{Description, Kinematics};
 pub use finding::{Finding, FindingKind, YAW_RATE_UNITS};
 use pose::Poses;
-use wheels::Wheels;
+pub use scope::Scope;
+pub use wheels::expected_rate;
+use wheels::{Group, WheelChannel, Wheels};
 
 /// Factor about 1 within which a ratio is no finding: ground and faults do as much. The smallest
 /// factor of a unit is that of feet, 3.3.
@@ -32,6 +38,9 @@ const TURN_MIN_RAD: f64 = 0.2;
 const TURN_REVERSED: f64 = -0.5;
 /// Ratio of turns above which the unit is wrong: the geometric mean of 1 and 57 (degrees).
 const TURN_UNIT: f64 = 8.0;
+/// Ratio of turns below which a robot does not follow its command. A skid-steered one turns by a
+/// third on grippy ground; revolutions for rad read 0.16.
+const TURN_MIN: f64 = 0.2;
 /// A pause in the frames beyond which the motion counts as interrupted, s. Six periods of a sensor
 /// of 20 Hz.
 pub const PAUSE_S: f64 = 0.3;
@@ -41,21 +50,34 @@ const SETTLED_S: f64 = 0.3;
 /// Change of the commanded velocity that restarts this time, m/s and rad/s. Chosen: a tenth of the
 /// rover's fastest.
 const CHANGE: f64 = 0.05;
-/// Tests there may be: travel, turn, gyro, unit, and by wheel sign, steering, side.
-const TESTS: usize = 4 + 3 * vigil_blocks::WHEELS;
+/// Tests there may be: travel, turn, gyro, unit, and by wheel those of [`SIGN`] to [`STEER_ORDER`].
+const TESTS: usize = STEER_ORDER + vigil_blocks::WHEELS;
 
 /// Bits of all of them.
-const ALL: u32 = (1 << TESTS) - 1;
+const ALL: u64 = (1 << TESTS) - 1;
 
 /// Outcome of one test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TestOutcome {
     /// The motion has not excited it.
     NotYet,
+    /// The motion has, and the channel does not follow it: neither right nor explained.
+    Unclear,
     /// The frames agree with the description.
     Fits,
     /// They do not.
     Wrong(Finding),
+    /// They do not, and another test's finding says so.
+    Told,
+}
+
+/// Commanded motion in one frame.
+#[derive(Debug, Clone, Copy)]
+struct Motion {
+    /// Velocity: forward m/s, left m/s, yaw rate rad/s.
+    twist: [f64; 3],
+    /// For so long, s.
+    dt_s: f64,
 }
 
 /// The tests of one publisher.
@@ -74,11 +96,13 @@ pub struct PublisherCheck {
     /// Time since the tests were evaluated, s.
     unlooked_s: f64,
     /// Bits of the tests that have ended.
-    judged: u32,
+    judged: u64,
+    /// Bits of those of them that found something wrong.
+    wrong: u64,
     /// Bits of the tests of channels that the robot does not have.
-    absent: u32,
+    absent: u64,
     /// Bits of the tests that failed at the last evaluation: two failures in a row are a finding.
-    suspected: u32,
+    suspected: u64,
     is_blinding: bool,
 }
 
@@ -131,46 +155,8 @@ const UNIT: usize = 3;
 const SIGN: usize = 4;
 const STEER: usize = SIGN + vigil_blocks::WHEELS;
 const SIDES: usize = STEER + vigil_blocks::WHEELS;
-
-/// Tests of one kind, what they are about, and the motion that excites them.
-const GROUPS: [(std::ops::Range<usize>, &str, &str); 7] = [
-    (
-        TRAVEL..TURN,
-        "travel of the pose",
-        "drive four metres, or a quarter turn",
-    ),
-    (
-        TURN..GYRO,
-        "sign and unit of yaw",
-        "turn to either side on the way",
-    ),
-    (
-        GYRO..UNIT,
-        "sign and unit of yaw_rate",
-        "turn to either side on the way",
-    ),
-    (
-        UNIT..SIGN,
-        "unit of the wheel rates",
-        "drive for a second or two at one speed",
-    ),
-    (
-        SIGN..STEER,
-        "signs of",
-        "drive for a second or two at one speed",
-    ),
-    (STEER..SIDES, "signs of", "drive a curve"),
-    (SIDES..TESTS, "sides of wheels", "drive a curve"),
-];
-
-/// How much of a publisher's frames the motion has shown, in words.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Scope {
-    /// What has been judged.
-    pub judged: Vec<String>,
-    /// What has not, and the motion that would show it.
-    pub unjudged: Vec<(String, &'static str)>,
-}
+const AXLES: usize = SIDES + vigil_blocks::WHEELS;
+const STEER_ORDER: usize = AXLES + vigil_blocks::WHEELS;
 
 impl PublisherCheck {
     /// The tests for frames of `robot`.
@@ -187,6 +173,7 @@ impl PublisherCheck {
             settled_s: 0.0,
             unlooked_s: 0.0,
             judged: 0,
+            wrong: 0,
             absent: 0,
             suspected: 0,
             is_blinding: false,
@@ -196,33 +183,46 @@ impl PublisherCheck {
 
     /// Ends the tests of channels that the robot does not have.
     fn without_absent_channels(mut self) -> Self {
-        let (wheels, pairs) = (self.wheels.wheel_count(), self.wheels.pair_count());
-        let measured = self.robot.measured;
+        let (wheels, measured) = (self.wheels.wheel_count(), self.robot.measured);
         for test in 0..TESTS {
-            let is_there = match test {
-                TRAVEL | TURN => measured.pose,
-                GYRO => measured.yaw_rate,
-                UNIT => measured.wheel_rates && wheels > 0,
-                SIGN..STEER => measured.wheel_rates && test - SIGN < wheels,
-                STEER..SIDES => {
-                    let wheel = self.robot.wheels.get(test - STEER);
-                    measured.steer && wheel.is_some_and(|wheel| wheel.steered && wheels > 0)
-                }
-                _ => measured.wheel_rates && test - SIDES < pairs,
+            let wheel = wheel_of(test).filter(|wheel| *wheel < wheels);
+            let is_steered = |wheel: usize| measured.steer && self.robot.wheels[wheel].steered;
+            let has_others = |group| {
+                wheel.is_some_and(|wheel| self.wheels.others(group, wheel).next().is_some())
             };
-            self.absent |= u32::from(!is_there) << test;
+            let is_there = match test {
+                TRAVEL => measured.pose && self.robot.kinematics != Kinematics::None,
+                TURN => measured.pose && self.is_turned(),
+                GYRO => measured.yaw_rate && self.is_turned(),
+                UNIT => measured.wheel_rates && wheels > 0,
+                SIGN..STEER => measured.wheel_rates && wheel.is_some(),
+                STEER..SIDES => wheel.is_some_and(is_steered),
+                SIDES..AXLES => measured.wheel_rates && has_others(Group::Across),
+                AXLES..STEER_ORDER => measured.wheel_rates && has_others(Group::Side),
+                _ => wheel.is_some_and(is_steered) && has_others(Group::Steered),
+            };
+            self.absent |= u64::from(!is_there) << test;
         }
         self.judged = self.absent;
         self
     }
 
+    /// True if a command can ask for turns.
+    fn is_turned(&self) -> bool {
+        match self.robot.kinematics {
+            Kinematics::None => false,
+            Kinematics::Omni3 => self.robot.command.len() > 2,
+            _ => true,
+        }
+    }
+
     /// Restarts all tests, as for another publisher.
     pub fn reset(&mut self) {
         self.poses = Poses::default();
-        self.wheels.reset();
+        self.wheels.reset(&self.robot);
         (self.gyro, self.last) = (GyroSums::default(), None);
         (self.settled_s, self.unlooked_s) = (0.0, 0.0);
-        (self.judged, self.suspected) = (self.absent, 0);
+        (self.judged, self.wrong, self.suspected) = (self.absent, 0, 0);
         self.is_blinding = false;
     }
 
@@ -258,7 +258,7 @@ impl PublisherCheck {
         if self.settled_s < SETTLED_S {
             return None;
         }
-        self.add(frame, twist, dt_s);
+        self.add(frame, Motion { twist, dt_s });
         self.unlooked_s += dt_s;
         if self.unlooked_s < LOOK_S {
             return None;
@@ -266,7 +266,8 @@ impl PublisherCheck {
         self.look()
     }
 
-    fn add(&mut self, frame: &SensorFrame, twist: [f64; 3], dt_s: f64) {
+    fn add(&mut self, frame: &SensorFrame, motion: Motion) {
+        let Motion { twist, dt_s } = motion;
         let standing_m_s = self.robot.body.standing_m_s;
         self.poses
             .take(self.map.pose(frame), twist, dt_s, standing_m_s);
@@ -276,8 +277,7 @@ impl PublisherCheck {
             self.gyro.square += twist[2] * twist[2] * dt_s;
             self.gyro.turn_rad += twist[2].abs() * dt_s;
         }
-        self.wheels
-            .take(&self.robot, &self.map, frame, (twist, dt_s));
+        self.wheels.take(&self.robot, &self.map, frame, motion);
     }
 
     /// Evaluates every test that has not ended; returns the first that fails, and the others at the
@@ -288,17 +288,24 @@ impl PublisherCheck {
             "no test of a channel that the robot does not have is evaluated"
         );
         let (before, ended) = (self.suspected, self.judged);
+        self.wheels.settle();
         for test in (0..TESTS).filter(|test| ended >> test & 1 == 0) {
             let bit = 1 << test;
             match self.judge(test) {
-                TestOutcome::NotYet => self.suspected &= !bit,
+                TestOutcome::NotYet | TestOutcome::Unclear => self.suspected &= !bit,
                 TestOutcome::Fits => {
                     self.suspected &= !bit;
                     self.judged |= bit;
                 }
-                TestOutcome::Wrong(_) if before & bit == 0 => self.suspected |= bit,
+                TestOutcome::Wrong(_) | TestOutcome::Told if before & bit == 0 => {
+                    self.suspected |= bit;
+                }
+                TestOutcome::Told => {
+                    (self.judged, self.wrong) = (self.judged | bit, self.wrong | bit)
+                }
                 TestOutcome::Wrong(finding) => {
                     self.judged |= bit;
+                    self.wrong |= bit;
                     self.is_blinding |= finding.kind.is_blinding();
                     return Some(finding);
                 }
@@ -317,8 +324,14 @@ impl PublisherCheck {
             UNIT => self.wheels.unit(),
             SIGN..STEER => self.wheels.sign(test - SIGN),
             STEER..SIDES => self.wheels.steering(test - STEER),
-            _ => self.wheels.sides(test - SIDES),
+            SIDES..AXLES => self.order(WheelChannel::Rate, test - SIDES, Group::Across),
+            AXLES..STEER_ORDER => self.order(WheelChannel::Rate, test - AXLES, Group::Side),
+            _ => self.order(WheelChannel::Steer, test - STEER_ORDER, Group::Steered),
         }
+    }
+
+    fn order(&self, channel: WheelChannel, wheel: usize, group: Group) -> TestOutcome {
+        self.wheels.order(channel, wheel, group)
     }
 
     /// True once a test has ended.
@@ -326,62 +339,20 @@ impl PublisherCheck {
     pub const fn has_judged(&self) -> bool {
         self.judged != self.absent
     }
-
-    /// What has been judged, and what no motion has excited yet: in words, with the motion that
-    /// would. What the robot does not have is in neither.
-    #[must_use]
-    pub fn scope(&self) -> Scope {
-        let mut scope = Scope::default();
-        for (tests, what, motion) in GROUPS {
-            let of = |wanted: u32| -> Vec<String> {
-                let tests = tests.clone().filter(|test| self.absent >> test & 1 == 0);
-                let tests = tests.filter(|test| self.judged >> test & 1 == wanted);
-                tests.map(|test| self.channel_of(test)).collect()
-            };
-            let (judged, unjudged) = (of(1), of(0));
-            if !judged.is_empty() {
-                scope.judged.push(in_words(what, &judged));
-            }
-            if !unjudged.is_empty() {
-                scope.unjudged.push((in_words(what, &unjudged), motion));
-            }
-        }
-        scope
-    }
-
-    /// The channel that a test is about; empty where its name says so.
-    fn channel_of(&self, test: usize) -> String {
-        let wheel = |wheel: usize| {
-            self.robot
-                .wheels
-                .get(wheel)
-                .map_or("?", |wheel| &wheel.name)
-        };
-        match test {
-            SIGN..STEER => format!("enc_{}", wheel(test - SIGN)),
-            STEER..SIDES => format!("steer_{}", wheel(test - STEER)),
-            SIDES..TESTS => {
-                let [left, right] = self.wheels.pair(test - SIDES);
-                format!("{}/{}", wheel(left), wheel(right))
-            }
-            _ => String::new(),
-        }
-    }
-}
-
-/// `what`, and the channels that it is about, if it names them.
-fn in_words(what: &str, channels: &[String]) -> String {
-    let named: Vec<&str> = channels.iter().map(String::as_str).collect();
-    let text = format!("{what} {}", named.join(", "));
-    text.trim_end().to_owned()
 }
 
 /// A ratio of turns.
 fn turn(kind: FindingKind, ratio: f64) -> TestOutcome {
-    match !(TURN_REVERSED..=TURN_UNIT).contains(&ratio) {
-        true => TestOutcome::new(kind, None, ratio),
-        false => TestOutcome::Fits,
+    match ratio {
+        _ if !(TURN_REVERSED..=TURN_UNIT).contains(&ratio) => TestOutcome::new(kind, None, ratio),
+        _ if ratio < TURN_MIN => TestOutcome::Unclear,
+        _ => TestOutcome::Fits,
     }
+}
+
+/// The wheel of a test of one.
+fn wheel_of(test: usize) -> Option<usize> {
+    Some(test.checked_sub(SIGN)? % vigil_blocks::WHEELS)
 }
 
 #[cfg(test)]

@@ -131,15 +131,19 @@ impl Poses {
         if ratio > RATIO_MAX && total_m > CERTAIN * error_m {
             return TestOutcome::new(FindingKind::Travel, None, ratio);
         }
+        let has_come = self.swung_rad >= TURNED_RAD || self.come_m >= COME_M;
         // A robot that hardly moves has no direction.
         if ratio < 1.0 / RATIO_MAX || total_m < CERTAIN * error_m {
-            return TestOutcome::NotYet;
+            return match has_come {
+                true => TestOutcome::Unclear,
+                false => TestOutcome::NotYet,
+            };
         }
         let angle = left.atan2(along);
         match angle.abs() > ANGLE_MAX_RAD {
             true => TestOutcome::new(FindingKind::Heading, None, angle),
-            false if self.swung_rad < TURNED_RAD && self.come_m < COME_M => TestOutcome::NotYet,
-            false => TestOutcome::Fits,
+            false if has_come => TestOutcome::Fits,
+            false => TestOutcome::NotYet,
         }
     }
 

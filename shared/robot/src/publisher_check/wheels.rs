@@ -3,117 +3,94 @@
 use vigil_blocks::{SensorFrame, WHEELS};
 
 use super::finding::is_rate_unit;
-use super::{FindingKind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
+use super::order::{Gain, Order, OrderSums};
+use super::regression::RegressionSums;
+use super::{FindingKind, Motion, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
 use crate::channel_map::ChannelMap;
-use crate::description::Description;
-use crate::description::Kinematics;
+use crate::description::{Description, Kinematics, Wheel};
 use crate::learned::wheels::{rolling_rate, steering_angle};
 
 /// Time in motion, s, and commanded rolling, rad, from which wheels are judged: twenty frames at
 /// 20 Hz, and forty deviations of a rate's noise of 0.05 rad/s.
 const TIME_MIN_S: f64 = 1.0;
 const ROLLED_MIN_RAD: f64 = 2.0;
-/// Ratios between this and its inverse are those of a channel with the other sign: -1, by a factor
-/// of 2.5 either way for slip and gains.
-const REVERSED: f64 = -0.4;
-/// Squared correlation with the command above which a channel follows it: 0.77, which no noise
-/// reaches over [`TIME_MIN_S`].
-const FOLLOWS: f64 = 0.6;
-/// Ratio of squared residuals, exchanged to as named, below which wheels are exchanged: half the
-/// deviation.
-const EXCHANGED: f64 = 0.25;
 /// Mean commanded steering angle from which its sign is judged, rad: twenty deviations of the
 /// rover's steering sensor, 3 mrad.
 const STEER_MIN_RAD: f64 = 0.06;
+/// Part of the forward and left motion that the lesser one must have before the wheels of an omni
+/// drive are told apart: chosen, half the speed.
+const AXIS_MIN: f64 = 0.25;
+/// Commanded turn after which an order that no curve has shown is in doubt: a full turn.
+const TURN_ENOUGH_RAD: f64 = std::f64::consts::TAU;
+/// Places of all wheels.
+const PLACES: [usize; WHEELS] = [0, 1, 2, 3, 4, 5, 6, 7];
 
-/// Sums of a channel against what is expected of it.
-#[derive(Debug, Clone, Copy, Default)]
-struct RegressionSums {
-    time_s: f64,
-    found: f64,
-    expected: f64,
-    squares: f64,
-}
-
-impl RegressionSums {
-    fn add(&mut self, value: f64, expected: f64, dt_s: f64) {
-        self.time_s += dt_s;
-        self.found += value * expected * dt_s;
-        self.expected += expected * expected * dt_s;
-        self.squares += value * value * dt_s;
-    }
-
-    fn ratio(&self) -> f64 {
-        self.found / self.expected
-    }
-
-    fn follows(&self) -> bool {
-        self.found * self.found > FOLLOWS * self.expected * self.squares
-    }
-
-    fn is_reversed(&self) -> bool {
-        (1.0 / REVERSED..=REVERSED).contains(&self.ratio()) && self.follows()
-    }
-}
-
-/// Two opposite wheels: squared residuals as named and exchanged, and the squared difference of
-/// their expected rates.
-#[derive(Debug, Clone, Copy, Default)]
-struct Pair {
-    wheels: [usize; 2],
-    named: f64,
-    exchanged: f64,
-    difference: f64,
-    turned_rad: f64,
+/// Channels that each wheel has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum WheelChannel {
+    Rate,
+    Steer,
 }
 
 /// All wheels of a robot.
 #[derive(Debug, Clone)]
 pub(super) struct Wheels {
-    rates: [RegressionSums; WHEELS],
-    steer: [RegressionSums; WHEELS],
-    pairs: [Pair; WHEELS / 2],
-    pair_count: usize,
+    kinematics: Kinematics,
+    x_m: [f64; WHEELS],
+    y_m: [f64; WHEELS],
     wheel_count: usize,
+    /// Places of the steered wheels.
+    steered: [usize; WHEELS],
+    steered_count: usize,
+    rates: [RegressionSums; WHEELS],
+    /// The same where both sides of a robot that turns in place roll as one.
+    straight: [RegressionSums; WHEELS],
+    steer: [RegressionSums; WHEELS],
+    /// Squared way forward and to the left, m²/s.
+    way: [f64; 2],
+    turned_rad: f64,
+    rate_sums: OrderSums,
+    steer_sums: OrderSums,
+    /// Orders at the last evaluation.
+    rate_order: Option<Order>,
+    steer_order: Option<Order>,
 }
 
 impl Wheels {
     /// Wheels without any measurement.
     pub fn new(robot: &Description) -> Self {
-        let mut wheels = Self {
-            rates: [RegressionSums::default(); WHEELS],
-            steer: [RegressionSums::default(); WHEELS],
-            pairs: [Pair::default(); WHEELS / 2],
-            pair_count: 0,
-            wheel_count: match robot.kinematics {
-                // In which sense its wheels turn differs from maker to maker.
-                Kinematics::Omni3 | Kinematics::None => 0,
-                _ => robot.wheels.len().min(WHEELS),
-            },
-        };
-        for (i, left) in robot.wheels.iter().enumerate().take(wheels.wheel_count) {
-            let is_opposite = |other: &crate::description::Wheel| {
-                (other.x - left.x).abs() < 1e-6 && (other.y + left.y).abs() < 1e-6 && left.y > 0.0
-            };
-            let right = robot.wheels.iter().position(is_opposite);
-            if let (Some(j), Some(pair)) = (right, wheels.pairs.get_mut(wheels.pair_count)) {
-                pair.wheels = [i, j];
-                wheels.pair_count += 1;
-            }
+        let has_rates = robot.kinematics != Kinematics::None;
+        let wheel_count = usize::from(has_rates) * robot.wheels.len().min(WHEELS);
+        let wheels = &robot.wheels[..wheel_count];
+        let place =
+            |of: fn(&Wheel) -> f64| std::array::from_fn(|wheel| wheels.get(wheel).map_or(0.0, of));
+        let (mut steered, mut steered_count) = ([0; WHEELS], 0);
+        for (wheel, _) in wheels.iter().enumerate().filter(|(_, at)| at.steered) {
+            steered[steered_count] = wheel;
+            steered_count += 1;
         }
-        wheels
+        Self {
+            kinematics: robot.kinematics,
+            x_m: place(|wheel| wheel.x),
+            y_m: place(|wheel| wheel.y),
+            wheel_count,
+            steered,
+            steered_count,
+            rates: [RegressionSums::default(); WHEELS],
+            straight: [RegressionSums::default(); WHEELS],
+            steer: [RegressionSums::default(); WHEELS],
+            way: [0.0; 2],
+            turned_rad: 0.0,
+            rate_sums: OrderSums::default(),
+            steer_sums: OrderSums::default(),
+            rate_order: None,
+            steer_order: None,
+        }
     }
 
     /// Forgets all measurements.
-    pub fn reset(&mut self) {
-        self.rates = [RegressionSums::default(); WHEELS];
-        self.steer = [RegressionSums::default(); WHEELS];
-        for pair in &mut self.pairs {
-            *pair = Pair {
-                wheels: pair.wheels,
-                ..Pair::default()
-            };
-        }
+    pub fn reset(&mut self, robot: &Description) {
+        *self = Self::new(robot);
     }
 
     /// Takes a frame of a robot in motion.
@@ -122,82 +99,159 @@ impl Wheels {
         robot: &Description,
         map: &ChannelMap,
         frame: &SensorFrame,
-        ([speed, _, turn], dt_s): ([f64; 3], f64),
+        motion: Motion,
     ) {
-        let mut expected = [0.0; WHEELS];
-        for (wheel, expected) in expected.iter_mut().enumerate().take(self.wheel_count) {
-            *expected = match robot.kinematics {
-                Kinematics::Ackermann6 => rolling_rate(robot, wheel, frame.command[0], speed),
-                _ => (speed - robot.wheels[wheel].y * turn) / robot.wheel_radius_m,
-            };
+        let [speed, left, turn] = motion.twist;
+        let dt_s = motion.dt_s;
+        let reach_m = self.y_m.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+        let is_differential = self.kinematics == Kinematics::Differential;
+        let is_straight = !is_differential || speed.abs() >= 2.0 * reach_m * turn.abs();
+        let mut found = [(0.0, false); WHEELS];
+        let (mut expected, mut angles) = ([0.0; WHEELS], [0.0; WHEELS]);
+        let mut steers = found;
+        for wheel in 0..self.wheel_count {
+            expected[wheel] = expected_rate(robot, wheel, &frame.command);
+            angles[wheel] = steering_angle(robot, wheel, frame.command[0]);
             if let Some(rate) = map.wheel_rate(frame, wheel) {
-                self.rates[wheel].add(rate, *expected, dt_s);
+                found[wheel] = (rate, true);
+                self.rates[wheel].add(rate, expected[wheel], dt_s);
+                if is_straight {
+                    self.straight[wheel].add(rate, expected[wheel], dt_s);
+                }
             }
-            if let Some(measured) = map.steer(frame, wheel) {
-                let angle = steering_angle(robot, wheel, frame.command[0]);
-                self.steer[wheel].add(measured, angle, dt_s);
+            if let Some(angle) = map.steer(frame, wheel) {
+                steers[wheel] = (angle, true);
+                self.steer[wheel].add(angle, angles[wheel], dt_s);
             }
         }
-        if turn.abs() < TURNING_1_M * speed.abs() {
+        (self.way[0], self.way[1]) = (
+            self.way[0] + speed * speed * dt_s,
+            self.way[1] + left * left * dt_s,
+        );
+        let is_omni = self.kinematics == Kinematics::Omni3;
+        if !is_omni && turn.abs() < TURNING_1_M * speed.abs() {
             return;
         }
-        for pair in &mut self.pairs[..self.pair_count] {
-            let [i, j] = pair.wheels;
-            let rates = (map.wheel_rate(frame, i), map.wheel_rate(frame, j));
-            let (Some(left), Some(right)) = rates else {
-                continue;
-            };
-            let square = |rate: f64, place: usize| (rate - expected[place]).powi(2) * dt_s;
-            pair.named += square(left, i) + square(right, j);
-            pair.exchanged += square(left, j) + square(right, i);
-            pair.difference += (expected[i] - expected[j]).powi(2) * dt_s;
-            pair.turned_rad += turn.abs() * dt_s;
+        self.turned_rad += turn.abs() * dt_s;
+        let wheels = &PLACES[..self.wheel_count];
+        if wheels.iter().all(|&wheel| found[wheel].1) {
+            let values = found.map(|(value, _)| value);
+            self.rate_sums.add(wheels, &values, &expected, dt_s);
+        }
+        let steered = &self.steered[..self.steered_count];
+        if steered.iter().all(|&wheel| steers[wheel].1) {
+            let values = steers.map(|(value, _)| value);
+            self.steer_sums.add(steered, &values, &angles, dt_s);
         }
     }
 
-    /// True once the wheel was commanded to roll far enough.
-    fn is_judged(&self, wheel: usize) -> bool {
-        let rate = &self.rates[wheel];
-        let rolled_rad = (rate.expected * rate.time_s).sqrt();
-        rate.time_s >= TIME_MIN_S && rolled_rad >= ROLLED_MIN_RAD
+    /// Finds the orders that fit best, for the tests that follow.
+    pub fn settle(&mut self) {
+        let is_shown = match self.kinematics {
+            Kinematics::Omni3 => self.has_both_axes(),
+            _ => self.turned_rad >= TURN_MIN_RAD,
+        };
+        if !is_shown {
+            return;
+        }
+        let wheels = &PLACES[..self.wheel_count];
+        if self.rate_sums.time_s > 0.0 {
+            let order = |gain| self.rate_sums.best(wheels, &self.x_m, gain);
+            self.rate_order = Some(match self.kinematics {
+                Kinematics::Omni3 => {
+                    // In which sense its wheels turn differs from maker to maker.
+                    let factor = 1.0 / self.rate_sums.size(wheels).max(f64::MIN_POSITIVE);
+                    let both = [factor, -factor].map(|f| order(Gain::Known([f; WHEELS])));
+                    let [one, other] = both;
+                    match one.residual(wheels) <= other.residual(wheels) {
+                        true => one,
+                        false => other,
+                    }
+                }
+                _ => order(Gain::Known(self.factors())),
+            });
+        }
+        if self.steer_sums.time_s > 0.0 {
+            let steered = &self.steered[..self.steered_count];
+            self.steer_order = Some(self.steer_sums.best(steered, &self.x_m, Gain::EitherSign));
+        }
+    }
+
+    /// What makes of each rate one in rad/s with the sign of the command.
+    fn factors(&self) -> [f64; WHEELS] {
+        let middle = self.middle().map_or(1.0, f64::abs);
+        let factor = 1.0 / middle.max(f64::MIN_POSITIVE);
+        std::array::from_fn(|wheel| {
+            let straight = &self.straight[wheel];
+            match is_rolled(straight) && straight.is_reversed(1.0) {
+                true => -factor,
+                false => factor,
+            }
+        })
+    }
+
+    /// Middle of the wheels' ratios of rate to command; none where half of the wheels or more do
+    /// not follow: a fault of one must not look like a unit.
+    fn middle(&self) -> Option<f64> {
+        let mut ratios = [0.0; WHEELS];
+        let mut count = 0;
+        for rate in &self.rates[..self.wheel_count] {
+            if is_rolled(rate) && rate.follows() {
+                ratios[count] = rate.ratio();
+                count += 1;
+            }
+        }
+        if 2 * count <= self.wheel_count {
+            return None;
+        }
+        let ratios = &mut ratios[..count];
+        ratios.sort_unstable_by(f64::total_cmp);
+        Some(ratios[count / 2])
     }
 
     /// Tests the unit of the rates: all wheels share it.
     pub fn unit(&self) -> TestOutcome {
-        let mut ratios = [0.0; WHEELS];
-        let mut count = 0;
-        for wheel in (0..self.wheel_count).filter(|&wheel| self.is_judged(wheel)) {
-            if self.rates[wheel].follows() {
-                ratios[count] = self.rates[wheel].ratio();
-                count += 1;
+        let rolled = self.rates[..self.wheel_count].iter();
+        let rolled = rolled.filter(|rate| is_rolled(rate)).count();
+        match self.middle() {
+            None if 2 * rolled <= self.wheel_count => TestOutcome::NotYet,
+            None => TestOutcome::Unclear,
+            Some(middle) if middle.abs() > RATIO_MAX || is_rate_unit(middle.abs()) => {
+                TestOutcome::new(FindingKind::Rates, None, middle)
             }
-        }
-        // Half of the wheels or fewer decide no unit: a fault of one must not look like it.
-        if 2 * count <= self.wheel_count {
-            return TestOutcome::NotYet;
-        }
-        let ratios = &mut ratios[..count];
-        ratios.sort_unstable_by(f64::total_cmp);
-        let middle = ratios[count / 2];
-        match middle.abs() > RATIO_MAX || is_rate_unit(middle) {
-            true => TestOutcome::new(FindingKind::Rates, None, middle),
-            false => TestOutcome::Fits,
+            Some(middle) if middle.abs() < 1.0 / RATIO_MAX => TestOutcome::Unclear,
+            Some(_) => TestOutcome::Fits,
         }
     }
 
     /// Tests the sign of one wheel's rate.
     pub fn sign(&self, wheel: usize) -> TestOutcome {
-        if wheel >= self.wheel_count || !self.is_judged(wheel) {
+        let is_shown = self.kinematics != Kinematics::Omni3 || self.has_both_axes();
+        if wheel >= self.wheel_count || !is_shown || !is_rolled(&self.straight[wheel]) {
             return TestOutcome::NotYet;
         }
-        match self.rates[wheel].is_reversed() {
-            true => TestOutcome::new(
-                FindingKind::RateSign,
-                Some(wheel),
-                self.rates[wheel].ratio(),
-            ),
-            false => TestOutcome::Fits,
+        let (straight, sense) = (&self.straight[wheel], self.sense());
+        if straight.is_reversed(sense) {
+            return TestOutcome::new(FindingKind::RateSign, Some(wheel), straight.ratio());
         }
+        match straight.follows() && sense * straight.ratio() > 0.0 {
+            true => TestOutcome::Fits,
+            false => TestOutcome::Unclear,
+        }
+    }
+
+    /// 1, or -1 where most wheels of an omni drive turn in the other sense; 0 if no more than half
+    /// agree.
+    fn sense(&self) -> f64 {
+        if self.kinematics != Kinematics::Omni3 {
+            return 1.0;
+        }
+        self.middle().map_or(0.0, f64::signum)
+    }
+
+    fn has_both_axes(&self) -> bool {
+        let [forward, left] = self.way;
+        forward.min(left) >= AXIS_MIN * forward.max(left) && forward.min(left) > 0.0
     }
 
     /// Tests the sign of one steering angle.
@@ -205,27 +259,69 @@ impl Wheels {
         let Some(steer) = self.steer.get(wheel) else {
             return TestOutcome::NotYet;
         };
-        let is_judged = steer.time_s >= TIME_MIN_S
-            && steer.expected >= STEER_MIN_RAD * STEER_MIN_RAD * steer.time_s;
-        match (is_judged, steer.is_reversed()) {
-            (false, _) => TestOutcome::NotYet,
-            (true, true) => TestOutcome::new(FindingKind::SteerSign, Some(wheel), steer.ratio()),
-            (true, false) => TestOutcome::Fits,
+        let least = STEER_MIN_RAD * STEER_MIN_RAD * steer.time_s;
+        if steer.time_s < TIME_MIN_S || steer.expected < least {
+            return TestOutcome::NotYet;
+        }
+        if steer.is_reversed(1.0) {
+            return TestOutcome::new(FindingKind::SteerSign, Some(wheel), steer.ratio());
+        }
+        match steer.follows() && (1.0 / RATIO_MAX..RATIO_MAX).contains(&steer.ratio()) {
+            true => TestOutcome::Fits,
+            false => TestOutcome::Unclear,
         }
     }
 
-    /// Tests whether two opposite wheels are exchanged.
-    pub fn sides(&self, pair: usize) -> TestOutcome {
-        let Some(pair) = self.pairs[..self.pair_count].get(pair) else {
+    /// Tests whether a channel reads the wheel of its name and not another of `group`.
+    pub fn order(&self, channel: WheelChannel, wheel: usize, group: Group) -> TestOutcome {
+        let order = match channel {
+            WheelChannel::Rate => &self.rate_order,
+            WheelChannel::Steer => &self.steer_order,
+        };
+        let Some(order) = order else {
             return TestOutcome::NotYet;
         };
-        if pair.turned_rad < TURN_MIN_RAD {
-            return TestOutcome::NotYet;
+        if let Some(other) = order.other_wheel(wheel) {
+            return match (self.is_in(group, wheel, other), order.is_exchange(wheel)) {
+                (false, _) => TestOutcome::NotYet,
+                // Told of the first of both.
+                (true, true) if other < wheel => TestOutcome::Told,
+                (true, is_exchange) => {
+                    let kind = FindingKind::order(channel, is_exchange);
+                    TestOutcome::new(kind, Some(wheel), other as f64)
+                }
+            };
         }
-        let is_exchanged = pair.exchanged < EXCHANGED * pair.named && pair.named > pair.difference;
-        match is_exchanged {
-            true => TestOutcome::new(FindingKind::Sides, Some(pair.wheels[0]), 0.0),
-            false => TestOutcome::Fits,
+        let mut others = self.others(group, wheel);
+        match others.all(|other| order.tells_apart(wheel, other)) {
+            true => TestOutcome::Fits,
+            false if self.turned_rad > TURN_ENOUGH_RAD && group != Group::Side => {
+                TestOutcome::Unclear
+            }
+            false => TestOutcome::NotYet,
+        }
+    }
+
+    /// Wheels of a group.
+    pub fn others(&self, group: Group, wheel: usize) -> impl Iterator<Item = usize> {
+        let all = 0..self.wheel_count;
+        all.filter(move |&other| other != wheel && self.is_in(group, wheel, other))
+    }
+
+    fn is_in(&self, group: Group, wheel: usize, other: usize) -> bool {
+        let differs = |a: f64, b: f64| (a - b).abs() > 1e-6;
+        let is_aside = differs(self.y_m[wheel], self.y_m[other]);
+        let is_elsewhere = differs(self.x_m[wheel].abs(), self.x_m[other].abs());
+        let is_omni = self.kinematics == Kinematics::Omni3;
+        let has_curves = self.kinematics == Kinematics::Ackermann6;
+        match group {
+            Group::Across => is_aside || is_omni,
+            Group::Side => !is_aside && is_elsewhere && has_curves,
+            Group::Alike => !(is_aside || is_omni || is_elsewhere && has_curves),
+            Group::Steered => {
+                let steered = &self.steered[..self.steered_count];
+                (is_aside || is_elsewhere) && steered.contains(&other)
+            }
         }
     }
 
@@ -233,14 +329,39 @@ impl Wheels {
     pub const fn wheel_count(&self) -> usize {
         self.wheel_count
     }
+}
 
-    /// The wheels of a pair, left and right.
-    pub fn pair(&self, pair: usize) -> [usize; 2] {
-        self.pairs.get(pair).map_or([0; 2], |pair| pair.wheels)
-    }
+/// Wheels that a wheel's channel is told from, by what shows the difference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Group {
+    /// On the other side: any curve.
+    Across,
+    /// On the same side, nearer to the middle or further from it: tight curves.
+    Side,
+    /// That read the same in every motion.
+    Alike,
+    /// Steered by another angle.
+    Steered,
+}
 
-    /// Pairs of opposite wheels.
-    pub const fn pair_count(&self) -> usize {
-        self.pair_count
+fn is_rolled(rate: &RegressionSums) -> bool {
+    let rolled_rad = (rate.expected * rate.time_s).sqrt();
+    rate.time_s >= TIME_MIN_S && rolled_rad >= ROLLED_MIN_RAD
+}
+
+/// Rate (rad/s) that rolling without slip demands of a wheel at a command. An omni drive's wheels
+/// may all turn in the other sense.
+#[must_use]
+pub fn expected_rate(robot: &Description, wheel: usize, command: &[f64]) -> f64 {
+    let ([speed, left, turn], at) = (robot.twist(command), &robot.wheels[wheel]);
+    match robot.kinematics {
+        Kinematics::Ackermann6 => rolling_rate(robot, wheel, command[0], speed),
+        Kinematics::Omni3 => {
+            let reach_m = at.x.hypot(at.y).max(1e-9);
+            let speed_m_s = (at.x * left - at.y * speed) / reach_m + reach_m * turn;
+            speed_m_s / robot.wheel_radius_m
+        }
+        Kinematics::Differential => (speed - at.y * turn) / robot.wheel_radius_m,
+        Kinematics::None => 0.0,
     }
 }

@@ -10,6 +10,7 @@ mod gaps;
 mod injection;
 mod learned;
 mod noise;
+mod publisher_check;
 mod rover;
 mod slip;
 mod stuck_sets;
