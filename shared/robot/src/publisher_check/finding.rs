@@ -110,12 +110,13 @@ impl Finding {
     /// In words, for the author of the publisher.
     #[must_use]
     pub fn text(&self, robot: &Description) -> String {
-        let name = |place: Option<usize>| {
-            let wheel = place.and_then(|place| robot.wheels.get(place));
-            wheel.map_or("?", |wheel| wheel.name.as_str())
-        };
+        let name = |place: usize| robot.wheels.get(place).map_or("?", |wheel| &wheel.name);
         // An order's value is a wheel's place.
-        let (wheel, other) = (name(self.wheel), name(Some(self.value.max(0.0) as usize)));
+        let places = [
+            self.wheel.unwrap_or(usize::MAX),
+            self.value.max(0.0) as usize,
+        ];
+        let [wheel, other] = places.map(name);
         let turn = turning(robot);
         let v = self.value;
         let are_they = |units| unit(v, "are they", units);
@@ -152,7 +153,7 @@ impl Finding {
             FindingKind::RateSign => format!("signs: enc_{wheel} has the other sign"),
             FindingKind::Sides => format!(
                 "order: enc_{wheel} and enc_{other} fit when exchanged{}",
-                or_turned(robot, turn)
+                or_turned(robot, turn, places)
             ),
             FindingKind::RateOrder => format!("order: enc_{wheel} fits as enc_{other}"),
             FindingKind::SteerSides => {
@@ -173,10 +174,13 @@ impl Finding {
 }
 
 /// Sides are exchanged alike by a command that turns the other way.
-fn or_turned(robot: &Description, turn: &str) -> String {
+fn or_turned(robot: &Description, turn: &str, wheels: [usize; 2]) -> String {
+    let [y, other_y] = wheels.map(|wheel| robot.wheels.get(wheel).map_or(0.0, |wheel| wheel.y));
     match robot.kinematics {
-        Kinematics::Omni3 | Kinematics::None => String::new(),
-        _ => format!("; or is {turn} positive to the right?"),
+        Kinematics::Ackermann6 | Kinematics::Differential if y * other_y < 0.0 => {
+            format!("; or is {turn} positive to the right?")
+        }
+        _ => String::new(),
     }
 }
 

@@ -4,11 +4,13 @@ use vigil_blocks::WHEELS;
 
 /// Ratio of squared residuals below which one order fits and another does not: half the deviation.
 const EXCHANGED: f64 = 0.25;
-/// Part of the squared residual as named that each changed channel must win: of orders that fit
-/// alike the one with the fewest changes is told.
-const CHANGE: f64 = 0.05;
-/// Further part where the other wheel is not straight opposite.
-const ASIDE: f64 = 0.01;
+/// Squared residual that each changed channel must win, as a part of that of the order that fits best: of
+/// orders that fit alike the one with the fewest changes is told.
+const CHANGE: f64 = 0.5;
+/// The same where the other wheel is not straight opposite.
+const CHANGE_ASIDE: f64 = 0.6;
+/// Least residual, as a part of that as named: sums are no more exact.
+const EXACT: f64 = 1e-6;
 
 /// How a channel's sign is known.
 #[derive(Debug, Clone, Copy)]
@@ -96,13 +98,15 @@ impl OrderSums {
                 costs[i][j] = self.cost(i, j, gain);
             }
         }
-        let as_named: f64 = wheels.iter().map(|&i| costs[i][i]).sum();
+        let sum = |reads: [usize; WHEELS]| wheels.iter().map(|&i| costs[i][reads[i]]).sum();
+        let as_named: f64 = sum(std::array::from_fn(|i| i));
+        let least: f64 = sum(assignment(wheels, &costs));
         let mut weighed = costs;
         for &i in wheels {
             for &j in wheels.iter().filter(|&&j| j != i) {
                 let is_aside = (x_m[i] - x_m[j]).abs() > 1e-6;
-                let part = if is_aside { CHANGE + ASIDE } else { CHANGE };
-                weighed[i][j] += part * as_named;
+                let change = if is_aside { CHANGE_ASIDE } else { CHANGE };
+                weighed[i][j] += change * least.max(EXACT * as_named);
             }
         }
         let mut order = Order {

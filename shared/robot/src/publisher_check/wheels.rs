@@ -17,9 +17,9 @@ const ROLLED_MIN_RAD: f64 = 2.0;
 /// Mean commanded steering angle from which its sign is judged, rad: twenty deviations of the
 /// rover's steering sensor, 3 mrad.
 const STEER_MIN_RAD: f64 = 0.06;
-/// Part of the forward and left motion that the lesser one must have before the wheels of an omni
-/// drive are told apart: chosen, half the speed.
-const AXIS_MIN: f64 = 0.25;
+/// Ratio of the forward and the left motion, squared, from which the wheels of an omni drive are
+/// told apart: below it two exchanged ones of three still follow, by [`RegressionSums::follows`].
+const AXIS_MIN: f64 = 0.6;
 /// Commanded turn after which an order that no curve has shown is in doubt: a full turn.
 const TURN_ENOUGH_RAD: f64 = std::f64::consts::TAU;
 /// Places of all wheels.
@@ -156,20 +156,24 @@ impl Wheels {
         }
         let wheels = &PLACES[..self.wheel_count];
         if self.rate_sums.time_s > 0.0 {
-            let order = |gain| self.rate_sums.best(wheels, &self.x_m, gain);
-            self.rate_order = Some(match self.kinematics {
+            let order = |factors| {
+                let gain = Gain::Known(factors);
+                self.rate_sums.best(wheels, &self.x_m, gain)
+            };
+            let factors = self.factors();
+            let order = match self.kinematics {
                 Kinematics::Omni3 => {
                     // In which sense its wheels turn differs from maker to maker.
-                    let factor = 1.0 / self.rate_sums.size(wheels).max(f64::MIN_POSITIVE);
-                    let both = [factor, -factor].map(|f| order(Gain::Known([f; WHEELS])));
+                    let both = [factors, factors.map(|factor| -factor)].map(order);
                     let [one, other] = both;
                     match one.residual(wheels) <= other.residual(wheels) {
                         true => one,
                         false => other,
                     }
                 }
-                _ => order(Gain::Known(self.factors())),
-            });
+                _ => order(factors),
+            };
+            self.rate_order = Some(order);
         }
         if self.steer_sums.time_s > 0.0 {
             let steered = &self.steered[..self.steered_count];
@@ -179,11 +183,14 @@ impl Wheels {
 
     /// What makes of each rate one in rad/s with the sign of the command.
     fn factors(&self) -> [f64; WHEELS] {
-        let middle = self.middle().map_or(1.0, f64::abs);
-        let factor = 1.0 / middle.max(f64::MIN_POSITIVE);
+        let size = match self.kinematics {
+            Kinematics::Omni3 => self.rate_sums.size(&PLACES[..self.wheel_count]),
+            _ => self.middle().map_or(1.0, f64::abs),
+        };
+        let (factor, sense) = (1.0 / size.max(f64::MIN_POSITIVE), self.sense());
         std::array::from_fn(|wheel| {
             let straight = &self.straight[wheel];
-            match is_rolled(straight) && straight.is_reversed(1.0) {
+            match is_rolled(straight) && straight.is_reversed(sense) {
                 true => -factor,
                 false => factor,
             }
