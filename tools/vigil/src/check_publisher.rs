@@ -11,8 +11,8 @@ use crate::publisher;
 
 /// Listens to a publisher of sensor frames and says what to change in it.
 ///
-/// It listens beside a running graph, or in its place while none runs. The exit code is 0 if every
-/// frame fits.
+/// It listens beside a running graph, or in its place while none runs. The exit code is 0 if
+/// nothing that was judged is wrong.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -32,6 +32,17 @@ struct Document<'a> {
     frames: usize,
     seconds: f64,
     findings: &'a [Finding],
+}
+
+/// The last line: nothing fits as a whole that has not been judged as a whole.
+fn end(found: &[Finding]) -> String {
+    let [wrong, unjudged] = [Status::Failure, Status::Unjudged].map(|s| findings::count(found, s));
+    match (wrong, unjudged) {
+        (0, 0) => "the publisher fits".to_owned(),
+        (0, _) => format!("nothing is wrong in what was judged; {unjudged} unjudged"),
+        (_, 0) => format!("to change: {wrong}, see FAILURE"),
+        _ => format!("to change: {wrong}, see FAILURE; {unjudged} unjudged"),
+    }
 }
 
 /// Listens and tells; outcome `Failed` if something will not work.
@@ -75,13 +86,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         output::json(&document).map_err(CommandError::failure)?;
     } else {
         findings::print(&found)?;
-        let end = if ok {
-            "the publisher fits".to_owned()
-        } else {
-            let wrong = found.iter().filter(|f| f.status == Status::Failure).count();
-            format!("to change: {wrong}, see FAILURE")
-        };
-        output::line(&end).map_err(CommandError::failure)?;
+        output::line(&end(&found)).map_err(CommandError::failure)?;
     }
     Ok(if ok { Outcome::Done } else { Outcome::Failed })
 }

@@ -11,6 +11,8 @@ use vigil_terminal::output;
 pub enum Status {
     /// As it should be.
     Ok,
+    /// Nothing has shown how it is.
+    Unjudged,
     /// It will work, but not as well as it could.
     Warning,
     /// It will not work.
@@ -39,6 +41,11 @@ impl Finding {
     }
 }
 
+/// How many there are of this status.
+pub fn count(findings: &[Finding], status: Status) -> usize {
+    findings.iter().filter(|f| f.status == status).count()
+}
+
 /// True if none of them is a failure.
 pub fn have_no_failure(findings: &[Finding]) -> bool {
     findings.iter().all(|f| f.status != Status::Failure)
@@ -52,6 +59,7 @@ pub fn print(findings: &[Finding]) -> Result<(), CommandError> {
     for finding in findings {
         let mark = match finding.status {
             Status::Ok => "ok      ",
+            Status::Unjudged => "unjudged",
             Status::Warning => "warning ",
             Status::Failure => "FAILURE ",
         };

@@ -269,10 +269,13 @@ impl PublisherCheck {
     fn add(&mut self, frame: &SensorFrame, motion: Motion) {
         let Motion { twist, dt_s } = motion;
         let standing_m_s = self.robot.body.standing_m_s;
-        self.poses
-            .take(self.map.pose(frame), twist, dt_s, standing_m_s);
+        let pose = self
+            .map
+            .pose(frame)
+            .filter(|pose| pose.iter().all(|v| v.is_finite()));
+        self.poses.take(pose, twist, dt_s, standing_m_s);
         let turns = twist[2].abs() >= TURNING_1_M * twist[0].hypot(twist[1]);
-        if let Some(yaw_rate) = self.map.yaw_rate(frame).filter(|_| turns) {
+        if let Some(yaw_rate) = self.map.yaw_rate(frame).filter(|v| turns && v.is_finite()) {
             self.gyro.product += yaw_rate * twist[2] * dt_s;
             self.gyro.square += twist[2] * twist[2] * dt_s;
             self.gyro.turn_rad += twist[2].abs() * dt_s;

@@ -41,7 +41,7 @@ const GROUPS: [TestGroup; 9] = [
         tests: UNIT..SIGN,
         what: "unit of the wheel rates",
         channel: "",
-        motion: "drive for a second or two at one speed",
+        motion: "drive straight ahead for a second or two",
     },
     TestGroup {
         tests: SIGN..STEER,

@@ -42,8 +42,7 @@ pub(super) struct Wheels {
     /// Places of the steered wheels.
     steered: [usize; WHEELS],
     steered_count: usize,
-    rates: [RegressionSums; WHEELS],
-    /// The same where both sides of a robot that turns in place roll as one.
+    /// Rates where both sides roll much alike.
     straight: [RegressionSums; WHEELS],
     steer: [RegressionSums; WHEELS],
     /// Squared way forward and to the left, m²/s.
@@ -76,7 +75,6 @@ impl Wheels {
             wheel_count,
             steered,
             steered_count,
-            rates: [RegressionSums::default(); WHEELS],
             straight: [RegressionSums::default(); WHEELS],
             steer: [RegressionSums::default(); WHEELS],
             way: [0.0; 2],
@@ -104,22 +102,21 @@ impl Wheels {
         let [speed, left, turn] = motion.twist;
         let dt_s = motion.dt_s;
         let reach_m = self.y_m.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
-        let is_differential = self.kinematics == Kinematics::Differential;
-        let is_straight = !is_differential || speed.abs() >= 2.0 * reach_m * turn.abs();
+        let is_omni = self.kinematics == Kinematics::Omni3;
+        let is_straight = is_omni || speed.abs() >= 2.0 * reach_m * turn.abs();
         let mut found = [(0.0, false); WHEELS];
         let (mut expected, mut angles) = ([0.0; WHEELS], [0.0; WHEELS]);
         let mut steers = found;
         for wheel in 0..self.wheel_count {
             expected[wheel] = expected_rate(robot, wheel, &frame.command);
             angles[wheel] = steering_angle(robot, wheel, frame.command[0]);
-            if let Some(rate) = map.wheel_rate(frame, wheel) {
+            if let Some(rate) = map.wheel_rate(frame, wheel).filter(|v| v.is_finite()) {
                 found[wheel] = (rate, true);
-                self.rates[wheel].add(rate, expected[wheel], dt_s);
                 if is_straight {
                     self.straight[wheel].add(rate, expected[wheel], dt_s);
                 }
             }
-            if let Some(angle) = map.steer(frame, wheel) {
+            if let Some(angle) = map.steer(frame, wheel).filter(|v| v.is_finite()) {
                 steers[wheel] = (angle, true);
                 self.steer[wheel].add(angle, angles[wheel], dt_s);
             }
@@ -128,7 +125,6 @@ impl Wheels {
             self.way[0] + speed * speed * dt_s,
             self.way[1] + left * left * dt_s,
         );
-        let is_omni = self.kinematics == Kinematics::Omni3;
         if !is_omni && turn.abs() < TURNING_1_M * speed.abs() {
             return;
         }
@@ -183,9 +179,10 @@ impl Wheels {
 
     /// What makes of each rate one in rad/s with the sign of the command.
     fn factors(&self) -> [f64; WHEELS] {
-        let size = match self.kinematics {
-            Kinematics::Omni3 => self.rate_sums.size(&PLACES[..self.wheel_count]),
-            _ => self.middle().map_or(1.0, f64::abs),
+        let is_scaled = self.kinematics == Kinematics::Omni3 || self.has_other_unit();
+        let size = match is_scaled {
+            true => self.rate_sums.size(&PLACES[..self.wheel_count]),
+            false => 1.0,
         };
         let (factor, sense) = (1.0 / size.max(f64::MIN_POSITIVE), self.sense());
         std::array::from_fn(|wheel| {
@@ -202,7 +199,7 @@ impl Wheels {
     fn middle(&self) -> Option<f64> {
         let mut ratios = [0.0; WHEELS];
         let mut count = 0;
-        for rate in &self.rates[..self.wheel_count] {
+        for rate in &self.straight[..self.wheel_count] {
             if is_rolled(rate) && rate.follows() {
                 ratios[count] = rate.ratio();
                 count += 1;
@@ -216,14 +213,19 @@ impl Wheels {
         Some(ratios[count / 2])
     }
 
+    fn has_other_unit(&self) -> bool {
+        let is_other = |middle: f64| middle.abs() > RATIO_MAX || is_rate_unit(middle.abs());
+        self.middle().is_some_and(is_other)
+    }
+
     /// Tests the unit of the rates: all wheels share it.
     pub fn unit(&self) -> TestOutcome {
-        let rolled = self.rates[..self.wheel_count].iter();
+        let rolled = self.straight[..self.wheel_count].iter();
         let rolled = rolled.filter(|rate| is_rolled(rate)).count();
         match self.middle() {
             None if 2 * rolled <= self.wheel_count => TestOutcome::NotYet,
             None => TestOutcome::Unclear,
-            Some(middle) if middle.abs() > RATIO_MAX || is_rate_unit(middle.abs()) => {
+            Some(middle) if self.has_other_unit() => {
                 TestOutcome::new(FindingKind::Rates, None, middle)
             }
             Some(middle) if middle.abs() < 1.0 / RATIO_MAX => TestOutcome::Unclear,

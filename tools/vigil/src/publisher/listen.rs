@@ -125,22 +125,23 @@ impl Guard {
     }
 }
 
-/// Calls `take` whenever there may be input, until the time is over.
+/// Calls `take` whenever there may be input, and whether an event says so, until the time is over.
 fn while_it_lasts(
     seconds: f64,
     inputs: &impl Inputs,
     heard: &mut Reception,
-    mut take: impl FnMut(&mut Reception),
+    mut take: impl FnMut(&mut Reception, bool),
 ) -> Result<(), PortError> {
     let timer = Timer::new().map_err(|e| PortError::setup("timer", e))?;
     let from_ns = Monotonic.now_ns();
     let until_ns = from_ns.saturating_add((seconds * 1e9) as u64);
     while Monotonic.now_ns() < until_ns && !signal::stop_requested() {
         let next_ns = (Monotonic.now_ns() + SLEEP_NS).min(until_ns);
-        if wake::wait(&timer, inputs.descriptors(), next_ns) == wake::Wake::Input {
+        let is_told = wake::wait(&timer, inputs.descriptors(), next_ns) == wake::Wake::Input;
+        if is_told {
             inputs.drain();
         }
-        take(heard);
+        take(heard, is_told);
     }
     heard.seconds = Monotonic.now_ns().saturating_sub(from_ns) as f64 * 1e-9;
     Ok(())
@@ -176,7 +177,7 @@ fn topic(
     let mut guard = Guard::new(border);
     let mut health = BorderHealth::new(border, &graph)?;
     let (mut arrived, mut is_heard) = (Vec::with_capacity(frames.buffer()), false);
-    while_it_lasts(seconds, &listener, heard, |heard| {
+    while_it_lasts(seconds, &listener, heard, |heard, is_told| {
         health.look();
         for _ in 0..frames.buffer() {
             let Some(frame) = frames.take_next() else {
@@ -191,6 +192,7 @@ fn topic(
         };
         for (frame, now_ns) in arrived.drain(..).skip(old) {
             is_heard = true;
+            heard.unannounced += u64::from(!is_told);
             let is_taken = guard.take(&frame, now_ns);
             sink(heard, FrameArrival { now_ns, frame }, is_taken);
         }
@@ -223,7 +225,7 @@ fn sockets(
     let datagrams = std::rc::Rc::new(datagrams);
     let (mut guard, mut clock) = (Guard::new(border), ArrivalClock::default());
     let mut arrived = Vec::with_capacity(DATAGRAMS_MAX);
-    while_it_lasts(seconds, &datagrams, heard, |heard| {
+    while_it_lasts(seconds, &datagrams, heard, |heard, _| {
         let mut buffer = [0; DATAGRAM_SIZE + 1];
         arrived.clear();
         for _ in 0..DATAGRAMS_MAX {

@@ -1,7 +1,9 @@
 //! What an external publisher's frames look like to Vigil.
 
+mod command_time;
 mod content;
 mod listen;
+mod meaning;
 mod refused;
 mod running;
 mod timing;
@@ -32,6 +34,8 @@ pub struct Reception {
     pub frames: Vec<FrameArrival>,
     /// Frames beyond those.
     pub more: u64,
+    /// Frames that no event announced, though they came through shared memory.
+    pub unannounced: u64,
     /// How long was listened, s.
     pub seconds: f64,
     /// True if a graph was running, false if this program listened in its place.
@@ -43,6 +47,13 @@ pub struct Reception {
     pub rejected: [u64; REJECTIONS],
     /// What the graph's border says, where that is known.
     pub border: Option<BorderReport>,
+}
+
+impl Reception {
+    /// True if most frames came without the event that announces them.
+    pub fn is_silent(&self) -> bool {
+        2 * self.unannounced > self.frames.len() as u64 + self.more
+    }
 }
 
 /// What the service at the border of a running graph says of its input.

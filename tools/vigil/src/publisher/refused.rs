@@ -1,6 +1,7 @@
 //! Frames that are refused, why, and what to change.
 
 use vigil_blocks::Rejection;
+use vigil_blocks::datagram::DATAGRAM_SIZE;
 
 use super::Reception;
 use crate::findings::{Finding, Status};
@@ -19,7 +20,10 @@ pub fn findings(heard: &Reception) -> Vec<Finding> {
         return all.into_iter().collect();
     }
     let told = causes.iter().map(|cause| {
-        let detail = format!("{} frames: {}", count(cause), advice(*cause));
+        let mut detail = format!("{} frames: {}", count(cause), advice(*cause));
+        if *cause == Rejection::Malformed {
+            detail.push_str(&format!(": {DATAGRAM_SIZE} bytes"));
+        }
         Finding::new(
             format!("refused: {}", cause.as_str()),
             Status::Failure,

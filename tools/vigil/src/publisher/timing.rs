@@ -15,17 +15,25 @@ const CLOCK_S_MIN: f64 = 2.0;
 const STARTS_S_MAX: f64 = 0.5;
 /// Frames may arrive by this much earlier or later than usual, s.
 const ARRIVAL_OFF_MAX_S: f64 = 0.01;
+/// Missing sequence numbers that are a loss, and no counter that is wrong.
+const GAP_MAX: u64 = 10_000;
+/// Frames from which bursts are judged; part of the mean interval within which two arrive together;
+/// share of such frames beyond which the graph is late, as in its own test.
+const BURST_FRAMES_MIN: usize = 20;
+const TOGETHER: f64 = 0.2;
+const BURSTS_MAX: f64 = 0.3;
 /// A clock may be off by this share of time.
 const CLOCK_OFF_MAX: f64 = 5e-4;
 
 /// Findings about the times of the frames; there is at least one frame.
 pub fn findings(rate_hz: f64, heard: &Reception) -> Vec<Finding> {
     let frames = &heard.frames;
-    let mut all = vec![rate(rate_hz, frames)];
+    let mut all = vec![rate(rate_hz, heard)];
     all.extend(jitter(rate_hz, frames));
     all.push(gaps(heard));
     all.extend(starts(frames));
-    all.extend(way(frames));
+    all.extend(way(rate_hz, frames));
+    all.extend(bursts(heard));
     all.push(capture(frames));
     all
 }
@@ -44,7 +52,8 @@ fn intervals(frames: &[FrameArrival], at: impl Fn(&FrameArrival) -> u64) -> Vec<
         .collect()
 }
 
-fn rate(expected_hz: f64, frames: &[FrameArrival]) -> Finding {
+fn rate(expected_hz: f64, heard: &Reception) -> Finding {
+    let frames = &heard.frames;
     let (Some(first), Some(last)) = (frames.first(), frames.last()) else {
         return Finding::new("rate", Status::Failure, "no frame");
     };
@@ -53,7 +62,12 @@ fn rate(expected_hz: f64, frames: &[FrameArrival]) -> Finding {
         let detail = format!("{} frames are too few to tell", frames.len());
         return Finding::new("rate", Status::Warning, detail);
     }
-    let found_hz = (frames.len() - 1) as f64 / lasted_s;
+    // Lost and refused frames were sent too.
+    let others = match heard.border.and_then(|border| border.lost_at_socket) {
+        Some(lost) => lost + heard.rejected.iter().sum::<u64>(),
+        None => missing(frames).0,
+    };
+    let found_hz = (frames.len() as u64 - 1 + others) as f64 / lasted_s;
     let detail = format!("{found_hz:.2} Hz; graph.rate_hz is {expected_hz}");
     if (found_hz / expected_hz - 1.0).abs() <= RATE_OFF_MAX {
         return Finding::new("rate", Status::Ok, detail);
@@ -100,22 +114,60 @@ fn gaps(heard: &Reception) -> Finding {
         };
         return Finding::new("gaps", status, detail);
     }
-    let (mut lost, mut longest) = (0, 0);
-    for pair in heard.frames.windows(2) {
-        let [before, after] = [0, 1].map(|i| &pair[i].frame.header);
-        if before.epoch != after.epoch {
-            continue;
-        }
-        let missing = after.seq.saturating_sub(before.seq).saturating_sub(1);
-        lost += missing;
-        longest = longest.max(missing);
-    }
+    let (lost, longest) = missing(&heard.frames);
     if lost == 0 {
         return Finding::new("gaps", Status::Ok, "none: no sequence number is missing");
     }
     let detail =
         format!("{lost} frames are missing by their sequence numbers, {longest} in a row at most");
     Finding::new("gaps", Status::Warning, detail)
+}
+
+/// Frames that are missing by their sequence numbers: all, and the most in a row. A leap beyond
+/// [`GAP_MAX`] is no loss.
+fn missing(frames: &[FrameArrival]) -> (u64, u64) {
+    let (mut lost, mut longest) = (0, 0);
+    for pair in frames.windows(2) {
+        let [before, after] = [0, 1].map(|i| &pair[i].frame.header);
+        let missing = after.seq.saturating_sub(before.seq).saturating_sub(1);
+        if before.epoch == after.epoch && missing <= GAP_MAX {
+            lost += missing;
+            longest = longest.max(missing);
+        }
+    }
+    (lost, longest)
+}
+
+/// Frames that arrive together: in bursts, as a radio or a buffer makes them.
+fn bursts(heard: &Reception) -> Option<Finding> {
+    // Without an event this program wakes too late to tell.
+    if heard.frames.len() < BURST_FRAMES_MIN || heard.is_silent() {
+        return None;
+    }
+    let gaps_s = intervals(&heard.frames, |f| f.now_ns);
+    let mean_s = gaps_s.iter().sum::<f64>() / gaps_s.len().max(1) as f64;
+    let (mut together, mut at_once, mut most) = (0, 1, 1);
+    for gap_s in &gaps_s {
+        let is_together = *gap_s < TOGETHER * mean_s;
+        together += usize::from(is_together);
+        at_once = if is_together { at_once + 1 } else { 1 };
+        most = most.max(at_once);
+    }
+    let share = together as f64 / gaps_s.len().max(1) as f64;
+    let longest_ms = 1e3 * gaps_s.iter().copied().fold(0.0, f64::max);
+    let detail = format!(
+        "{:.0} % of the frames arrive together with the one before, {most} at once at most, after \
+         pauses of up to {longest_ms:.0} ms",
+        100.0 * share
+    );
+    Some(match share > BURSTS_MAX {
+        true => {
+            let advice = "the graph misses their deadlines: send each frame when it is captured, \
+                          and let nothing collect them on the way";
+            Finding::new("bursts", Status::Failure, format!("{detail}: {advice}"))
+        }
+        false => Finding::new("bursts", Status::Ok, detail),
+    })
 }
 
 /// How often the filters are made to begin anew.
@@ -147,7 +199,7 @@ fn starts(frames: &[FrameArrival]) -> Option<Finding> {
 }
 
 /// From when a frame was due to its arrival.
-fn way(frames: &[FrameArrival]) -> Option<Finding> {
+fn way(rate_hz: f64, frames: &[FrameArrival]) -> Option<Finding> {
     let mut latency = Latency::new().ok()?;
     for arrived in frames {
         let header = &arrived.frame.header;
@@ -162,7 +214,15 @@ fn way(frames: &[FrameArrival]) -> Option<Finding> {
         us(found.p99_ns),
         us(found.max_ns)
     );
-    Some(Finding::new("latency", Status::Ok, detail))
+    if found.p50_ns as f64 * 1e-9 <= 1.0 / rate_hz {
+        return Some(Finding::new("latency", Status::Ok, detail));
+    }
+    let advice = "most frames come after the next is due: the graph counts them as late";
+    Some(Finding::new(
+        "latency",
+        Status::Warning,
+        format!("{detail}: {advice}"),
+    ))
 }
 
 /// The clock of the capture times against this machine's.
@@ -246,7 +306,7 @@ mod tests {
     fn a_good_publisher_has_nothing_but_good_findings() {
         let found = found(100.0, frames(500, |_, _| {}));
         assert!(found.iter().all(|(_, s)| *s == Status::Ok), "{found:?}");
-        assert_eq!(found.len(), 5);
+        assert_eq!(found.len(), 6);
     }
 
     #[test]
@@ -259,7 +319,11 @@ mod tests {
         );
         let shaky = of(|k, f| f.frame.header.t_schedule_ns += 8 * MS * (k % 2));
         assert_eq!(status(&shaky, "jitter"), warning);
-        let lossy = of(|k, f| f.frame.header.seq += 3 * (k / 100));
+        let lossy = of(|k, f| {
+            f.frame.header.seq += k / 9;
+            f.now_ns += 10 * MS * (k / 9);
+        });
+        assert_eq!(status(&lossy, "rate"), Some(Status::Ok));
         assert_eq!(status(&lossy, "gaps"), warning);
         let restarted = of(|k, f| f.frame.header.epoch += k / 250);
         assert_eq!(status(&restarted, "starts"), warning);
@@ -271,6 +335,10 @@ mod tests {
         assert_eq!(status(&still, "capture clock"), failure);
         let back = of(|k, f| f.frame.header.t_capture_ns -= 50 * MS * (k / 250));
         assert_eq!(status(&back, "capture clock"), failure);
+        let bursts = of(|k, f| f.now_ns += 10 * MS * (9 - k % 10));
+        assert_eq!(status(&bursts, "bursts"), failure);
+        let late = of(|_, f| f.now_ns += 30 * MS);
+        assert_eq!(status(&late, "latency"), warning);
         let micros = of(|_, f| f.frame.header.t_capture_ns /= 1000);
         assert_eq!(status(&micros, "capture clock"), failure);
     }

@@ -2,7 +2,7 @@
 
 use vigil_blocks::{Block, SensorFrame};
 use vigil_cycle::Topic;
-use vigil_cycle::domain::Queues;
+use vigil_cycle::domain::{Domain, Queues};
 use vigil_cycle::port::FoundTopic;
 use vigil_setup::Border;
 use vigil_setup::graph_file::Source;
@@ -12,6 +12,9 @@ use crate::findings::{Finding, Status};
 
 /// Publishers that the graph lets a topic admit.
 const PUBLISHERS: usize = 1;
+
+/// Frames from which their announcement is judged.
+const ANNOUNCED_MIN: u64 = 5;
 
 /// The first few findings: the source, the type, its topic's settings, whether frames came.
 pub fn findings(border: &Border, heard: &Reception) -> Vec<Finding> {
@@ -23,6 +26,9 @@ pub fn findings(border: &Border, heard: &Reception) -> Vec<Finding> {
         all.extend(found.map(|found| settings(demanded, found)));
     }
     all.push(frames(border, heard));
+    if border.file.sensor.source != Source::Socket {
+        all.extend(notification(border, heard));
+    }
     all
 }
 
@@ -129,6 +135,26 @@ fn difference(found: &str) -> String {
     told.join(", ")
 }
 
+/// Whether each frame is announced by the event that wakes the graph.
+fn notification(border: &Border, heard: &Reception) -> Option<Finding> {
+    let (count, silent) = (heard.frames.len() as u64 + heard.more, heard.unannounced);
+    if count < ANNOUNCED_MIN {
+        return None;
+    }
+    let path = Topic::Sensor.path(&border.file.graph.name);
+    Some(match heard.is_silent() {
+        true => Finding::new(
+            "notification",
+            Status::Failure,
+            format!(
+                "frames arrive but no notification: {silent} of {count} without an event, so that \
+                 nothing wakes the graph. Notify the event service '{path}' after each frame"
+            ),
+        ),
+        false => Finding::new("notification", Status::Ok, "events announce the frames"),
+    })
+}
+
 fn frames(border: &Border, heard: &Reception) -> Finding {
     let (count, seconds) = (heard.frames.len() as u64 + heard.more, heard.seconds);
     if count > 0 {
@@ -165,7 +191,14 @@ fn frames(border: &Border, heard: &Reception) -> Finding {
             Topic::Sensor.path(graph)
         )
     };
-    let detail = format!("none in {seconds:.1} s: {how}");
+    let running = Domain::all_running();
+    let others = running.iter().map(String::as_str);
+    let others: Vec<&str> = others.filter(|name| name != graph).collect();
+    let elsewhere = match others.is_empty() {
+        true => String::new(),
+        false => format!(". Other graphs that run: {}", others.join(", ")),
+    };
+    let detail = format!("none in {seconds:.1} s: {how}{elsewhere}");
     Finding::new("frames", Status::Failure, detail)
 }
 
