@@ -1,5 +1,6 @@
 """Publishers of examples/ drive real graphs, which find the fault that was recorded."""
 
+import contextlib
 import csv
 import ctypes
 import gzip
@@ -194,25 +195,60 @@ class CheckPublisher(unittest.TestCase):
             document = self.check(graph.name)
             self.run_it(process)
         # Three seconds do not show all that a description says.
-        judged = [found for found in document["findings"] if not found["detail"].startswith("not judged yet")]
+        judged = [found for found in document["findings"] if found["status"] != "unjudged"]
         self.assertEqual([found for found in judged if found["status"] != "ok"], [])
+        self.assertIn("unjudged", self.status(document).values())
+
+    def changed(self, file, before, after, where, rate_hz):
+        """What is said of publisher.py where `before` in a file of examples/ is `after`; `where` runs it in a graph."""
+        with contextlib.ExitStack() as stack:
+            folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory()))
+            for name in ["joining.py", "publisher.py", "recording.py", "vigil_types.py", "waiting.py"]:
+                (folder / name).write_text((EXAMPLES / name).read_text())
+            text = (folder / file).read_text()
+            self.assertIn(before, text)
+            (folder / file).write_text(text.replace(before, after))
+            name = f"py{os.getpid()}-{file[:4]}"
+            if where == "graph":
+                graph = stack.enter_context(Graph("--source", "external", "--rate", str(rate_hz)))
+                name = graph.name
+            command = [sys.executable, folder / "publisher.py", FRAMES, str(STUCK_RUN), name, str(rate_hz)]
+            process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+            if where == "graph":
+                graph.wait_until_up()
+            document = self.check(name, "--source", "external", "--rate", str(rate_hz))
+            self.run_it(process)
+        return document
 
     def test_an_epoch_for_each_frame_is_told(self):
-        text = (EXAMPLES / "publisher.py").read_text()
-        text = text.replace("    publisher.publish", "    publisher._epoch += 1\n    publisher.publish")
-        self.assertIn("_epoch", text)
-        with Graph("--source", "external", "--rate", str(RATE_HZ)) as graph, tempfile.TemporaryDirectory() as folder:
-            for name in ["joining.py", "recording.py", "vigil_types.py", "waiting.py"]:
-                (pathlib.Path(folder) / name).write_text((EXAMPLES / name).read_text())
-            file = pathlib.Path(folder) / "publisher.py"
-            file.write_text(text)
-            command = [sys.executable, file, FRAMES, str(STUCK_RUN), graph.name, str(RATE_HZ)]
-            process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-            graph.wait_until_up()
-            document = self.check(graph.name)
-            self.run_it(process)
+        after = "    publisher._epoch += 1\n    publisher.publish"
+        document = self.changed("publisher.py", "    publisher.publish", after, "graph", RATE_HZ)
         self.assertEqual(self.status(document)["starts"], "failure")
         self.assertEqual(self.status(document)["refused: other-writer"], "failure")
+
+    def test_frames_without_a_notification_are_told_beside_a_graph_and_without_one(self):
+        for where in ["graph", "alone"]:
+            with self.subTest(where):
+                document = self.changed("joining.py", "self._bell.notify()", "pass", where, RATE_HZ)
+                (found,) = [f for f in document["findings"] if f["check"] == "notification"]
+                self.assertEqual(found["status"], "failure")
+                self.assertIn("frames arrive but no notification", found["detail"])
+
+    def test_frames_in_bursts_are_told(self):
+        # Five at once, at the right rate on the whole.
+        after = "    publisher._seq % 5 == 4 and time.sleep"
+        document = self.changed("publisher.py", "    time.sleep", after, "graph", RATE_HZ)
+        (found,) = [f for f in document["findings"] if f["check"] == "bursts"]
+        self.assertEqual(found["status"], "failure")
+        self.assertIn("5 at once", found["detail"])
+
+    def test_a_publisher_of_another_graph_name_is_told_which_graphs_run(self):
+        with Graph("--source", "external", "--rate", str(RATE_HZ)) as graph:
+            graph.wait_until_up()
+            document = self.check(f"py{os.getpid()}-wrong", "--source", "external")
+        (frames,) = [f for f in document["findings"] if f["check"] == "frames"]
+        self.assertIn("Other graphs that run: ", frames["detail"])
+        self.assertIn(graph.name, frames["detail"])
 
     def run_it(self, process):
         process.terminate()

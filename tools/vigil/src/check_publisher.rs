@@ -36,13 +36,21 @@ struct Document<'a> {
 
 /// The last line: nothing fits as a whole that has not been judged as a whole.
 fn end(found: &[Finding]) -> String {
-    let [wrong, unjudged] = [Status::Failure, Status::Unjudged].map(|s| findings::count(found, s));
-    match (wrong, unjudged) {
-        (0, 0) => "the publisher fits".to_owned(),
-        (0, _) => format!("nothing is wrong in what was judged; {unjudged} unjudged"),
-        (_, 0) => format!("to change: {wrong}, see FAILURE"),
-        _ => format!("to change: {wrong}, see FAILURE; {unjudged} unjudged"),
+    let all = [Status::Failure, Status::Warning, Status::Unjudged];
+    let [wrong, warnings, unjudged] = all.map(|status| findings::count(found, status));
+    if wrong + warnings + unjudged == 0 {
+        return "the publisher fits".to_owned();
     }
+    let mut end = match wrong {
+        0 => "nothing is wrong in what was judged".to_owned(),
+        _ => format!("to change: {wrong}, see FAILURE"),
+    };
+    for (what, count) in [("warnings", warnings), ("unjudged", unjudged)] {
+        if count > 0 {
+            end.push_str(&format!("; {what}: {count}"));
+        }
+    }
+    end
 }
 
 /// Listens and tells; outcome `Failed` if something will not work.
@@ -89,4 +97,24 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         output::line(&end(&found)).map_err(CommandError::failure)?;
     }
     Ok(if ok { Outcome::Done } else { Outcome::Failed })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_fits_that_was_not_judged() {
+        let of = |all: &[Status]| {
+            let found: Vec<Finding> = all.iter().map(|s| Finding::new("", *s, "")).collect();
+            end(&found)
+        };
+        assert_eq!(of(&[Status::Ok, Status::Ok]), "the publisher fits");
+        let unjudged = of(&[Status::Ok, Status::Unjudged]);
+        assert_eq!(unjudged, "nothing is wrong in what was judged; unjudged: 1");
+        let doubtful = of(&[Status::Warning, Status::Ok]);
+        assert_eq!(doubtful, "nothing is wrong in what was judged; warnings: 1");
+        let wrong = of(&[Status::Failure, Status::Unjudged]);
+        assert_eq!(wrong, "to change: 1, see FAILURE; unjudged: 1");
+    }
 }

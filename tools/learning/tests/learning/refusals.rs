@@ -169,8 +169,7 @@ fn signs_sides_and_silent_sensors_are_told() {
         ),
         (
             data.changed(|frame| frame.channel[3..9].rotate_left(3)),
-            "sides: enc_LF and the wheel opposite turn as each other should: are they exchanged, \
-             or is cmd_curv positive to the right?",
+            "order: enc_LF and enc_RF fit when exchanged; or is cmd_curv positive to the right?",
         ),
     ];
     for (found, wanted) in exact {

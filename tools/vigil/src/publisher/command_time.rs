@@ -117,3 +117,54 @@ fn unexplained(signals: &[Vec<[f64; 2]>], shift: i64, most: usize) -> f64 {
     };
     signals.iter().map(part).sum::<f64>() / signals.len().max(1) as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use vigil_blocks::SensorFrame;
+
+    use super::*;
+
+    /// A Kobuki that starts, stops and turns, and lags by a tenth of a second; its frames hold the
+    /// command of `late` frames before. 50 Hz.
+    fn told(late: usize, is_steady: bool) -> Status {
+        let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let robot = vigil_setup::load_robot(&root.join("config/robots/kobuki.toml")).unwrap();
+        let map = ChannelMap::new(&robot);
+        let commanded = |k: usize| match (is_steady, k / 80 % 4) {
+            (true, _) | (_, 0) => [0.3, 0.0],
+            (_, 1) => [0.0, 0.0],
+            (_, 2) => [0.2, 0.8],
+            _ => [0.2, -0.8],
+        };
+        let mut actual = [0.0; 2];
+        let one = |k: usize| {
+            let mut frame = SensorFrame::default();
+            for (axis, wanted) in commanded(k).into_iter().enumerate() {
+                actual[axis] += 0.2 * (wanted - actual[axis]);
+                frame.set_command(axis, actual[axis]);
+            }
+            for wheel in 0..2 {
+                let rate = expected_rate(&robot, wheel, &frame.command);
+                map.set_wheel_rate(&mut frame, wheel, rate);
+            }
+            map.set_yaw_rate(&mut frame, actual[1]);
+            for (axis, value) in commanded(k.saturating_sub(late)).into_iter().enumerate() {
+                frame.set_command(axis, value);
+            }
+            let now_ns = 20_000_000 * k as u64;
+            frame.header.t_capture_ns = now_ns;
+            FrameArrival { now_ns, frame }
+        };
+        let frames: Vec<FrameArrival> = (0..500).map(one).collect();
+        finding(&robot, &frames).unwrap().status
+    }
+
+    #[test]
+    fn a_command_that_comes_late_is_told_where_it_changes() {
+        assert_eq!(told(0, false), Status::Ok);
+        assert_eq!(told(25, false), Status::Failure);
+        assert_eq!(told(25, true), Status::Unjudged);
+    }
+}

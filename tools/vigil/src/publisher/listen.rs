@@ -98,14 +98,14 @@ impl Reception {
 }
 
 /// What a graph would refuse.
-struct Guard {
+pub(super) struct Guard {
     account: InputAccount,
     content: FrameGuard,
     period_ns: u64,
 }
 
 impl Guard {
-    fn new(border: &Border) -> Self {
+    pub fn new(border: &Border) -> Self {
         Self {
             account: InputAccount::new(match border.file.sensor.source {
                 Source::Socket => Writer::Socket,
@@ -117,11 +117,16 @@ impl Guard {
     }
 
     /// True if a graph would take it.
-    fn take(&mut self, frame: &SensorFrame, now_ns: u64) -> bool {
+    pub fn take(&mut self, frame: &SensorFrame, now_ns: u64) -> bool {
         let content = || self.content.check(frame);
         self.account
             .admit::<SensorFrame>(&frame.header, now_ns, self.period_ns, content)
             .is_taken()
+    }
+
+    /// What it refused, by cause.
+    pub const fn rejected(&self) -> [u64; REJECTIONS] {
+        self.account.rejected
     }
 }
 
@@ -202,7 +207,7 @@ fn topic(
         heard.border = health.report();
         health.rejected()
     } else {
-        guard.account.rejected
+        guard.rejected()
     };
     Ok(())
 }
@@ -253,7 +258,7 @@ fn sockets(
             sink(heard, FrameArrival { now_ns, frame }, is_taken);
         }
     })?;
-    heard.rejected = guard.account.rejected;
+    heard.rejected = guard.rejected();
     Ok(())
 }
 

@@ -4,6 +4,8 @@ mod command_time;
 mod content;
 mod listen;
 mod meaning;
+#[cfg(test)]
+mod mistakes;
 mod refused;
 mod running;
 mod timing;
