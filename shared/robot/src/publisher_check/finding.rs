@@ -2,8 +2,14 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::wheels::WheelChannel;
 use crate::description::{Description, Kinematics};
+
+/// Channels that each wheel has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum WheelChannel {
+    Rate,
+    Steer,
+}
 
 /// Kind of a finding. The value is its code in events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

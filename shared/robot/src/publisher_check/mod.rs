@@ -19,11 +19,12 @@ use vigil_blocks::SensorFrame;
 
 use crate::channel_map::ChannelMap;
 use crate::description::{Description, Kinematics};
+use finding::WheelChannel;
 pub use finding::{Finding, FindingKind, YAW_RATE_UNITS};
 use pose::Poses;
 pub use scope::Scope;
 pub use wheels::expected_rate;
-use wheels::{Group, WheelChannel, Wheels};
+use wheels::{Group, Wheels};
 
 /// Factor about 1 within which a ratio is no finding: ground and faults do as much. The smallest
 /// factor of a unit is that of feet, 3.3.

@@ -4,8 +4,8 @@ use vigil_blocks::WHEELS;
 
 /// Ratio of squared residuals below which one order fits and another does not: half the deviation.
 const EXCHANGED: f64 = 0.25;
-/// Squared residual that each changed channel must win, as a part of that of the order that fits best: of
-/// orders that fit alike the one with the fewest changes is told.
+/// Squared residual that each changed channel must win, as a part of that of the order that fits
+/// best: of orders that fit alike the one with the fewest changes is told.
 const CHANGE: f64 = 0.5;
 /// The same where the other wheel is not straight opposite.
 const CHANGE_ASIDE: f64 = 0.6;

@@ -2,7 +2,7 @@
 
 use vigil_blocks::{SensorFrame, WHEELS};
 
-use super::finding::is_rate_unit;
+use super::finding::{WheelChannel, is_rate_unit};
 use super::order::{Gain, Order, OrderSums};
 use super::regression::RegressionSums;
 use super::{FindingKind, Motion, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
@@ -24,13 +24,6 @@ const AXIS_MIN: f64 = 0.6;
 const TURN_ENOUGH_RAD: f64 = std::f64::consts::TAU;
 /// Places of all wheels.
 const PLACES: [usize; WHEELS] = [0, 1, 2, 3, 4, 5, 6, 7];
-
-/// Channels that each wheel has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum WheelChannel {
-    Rate,
-    Steer,
-}
 
 /// All wheels of a robot.
 #[derive(Debug, Clone)]

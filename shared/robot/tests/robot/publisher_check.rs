@@ -187,7 +187,8 @@ const CASES: &[Case] = &[
         mistake: |f, m| reorder(f, m, &[3, 4, 5, 0, 1, 2]) },
     Case { what: "gyro reversed", robots: TWO_SIDED, said: &["signs: yaw_rate is -0.9"],
         mistake: |f, m| scale_gyro(f, m, -1.0) },
-    Case { what: "yaw reversed", robots: ROVER, said: &["signs: yaw turns -1", "axes: x and y move"],
+    Case { what: "yaw reversed", robots: ROVER,
+        said: &["signs: yaw turns -1", "axes: x and y move"],
         mistake: |f, m| change_pose(f, m, |[x, y, yaw]| [x, y, -yaw]) },
     Case { what: "z down", robots: ROVER, said: &["signs: yaw turns -1"],
         mistake: |f, m| change_pose(f, m, |[x, y, yaw]| [x, -y, -yaw]) },
@@ -213,11 +214,15 @@ const CASES: &[Case] = &[
         said: &["order: enc_A and enc_C fit when exchanged"],
         mistake: |f, m| exchange(f, m, [0, 2]) },
     Case { what: "wheels one further", robots: &["robotino"], said: &[
-            "order: enc_A fits as enc_B", "order: enc_B fits as enc_C", "order: enc_C fits as enc_A"],
+            "order: enc_A fits as enc_B", "order: enc_B fits as enc_C",
+            "order: enc_C fits as enc_A"],
         mistake: |f, m| reorder(f, m, &[1, 2, 0]) },
     Case { what: "steering reversed", robots: ROVER, said: &[
             "signs: steer_LF", "signs: steer_LR", "signs: steer_RF", "signs: steer_RR"],
-        mistake: |f, m| (0..6).for_each(|w| { let a = m.steer(f, w).unwrap_or(0.0); m.set_steer(f, w, -a) }) },
+        mistake: |f, m| (0..6).for_each(|w| {
+            let angle = m.steer(f, w).unwrap_or(0.0);
+            m.set_steer(f, w, -angle);
+        }) },
     Case { what: "front steering exchanged", robots: ROVER,
         said: &["order: steer_LF and steer_RF fit when exchanged"],
         mistake: |f, m| steer_exchange(f, m, [0, 3]) },

@@ -20,7 +20,11 @@ struct Outcome {
 
 impl Outcome {
     /// Of frames that were changed before.
-    fn of(robot: &Description, frames: &[FrameArrival], change: impl Fn(&mut SensorFrame)) -> Self {
+    fn changed(
+        robot: &Description,
+        frames: &[FrameArrival],
+        change: impl Fn(&mut SensorFrame),
+    ) -> Self {
         let mut check = PublisherCheck::new(robot);
         let changed = frames.iter().map(|arrived| {
             let mut frame = arrived.frame;
@@ -39,7 +43,7 @@ impl Outcome {
 
 /// What fits, what does not, and what nothing has shown.
 pub fn findings(robot: &Description, frames: &[FrameArrival]) -> Vec<Finding> {
-    let as_sent = Outcome::of(robot, frames, |_| ());
+    let as_sent = Outcome::changed(robot, frames, |_| ());
     let finding = |status| move |detail| Finding::new("meaning", status, detail);
     let (texts, scope) = match mended(robot, frames, &as_sent) {
         Some((text, after)) => (
@@ -95,13 +99,13 @@ fn mended(
         outcome.doubts() == 0 && outcome.scope.fits.len() > as_sent.scope.fits.len()
     };
     for (i, axis) in axes.iter().enumerate() {
-        let after = Outcome::of(robot, frames, |frame| frame.command[i] = -frame.command[i]);
+        let after = Outcome::changed(robot, frames, |frame| frame.command[i] = -frame.command[i]);
         if fits(&after) {
             let text = format!("signs: all fits when {} has the other sign", axis.name);
             return Some((text, after));
         }
         for (j, other) in axes.iter().enumerate().skip(i + 1) {
-            let after = Outcome::of(robot, frames, |frame| frame.command.swap(i, j));
+            let after = Outcome::changed(robot, frames, |frame| frame.command.swap(i, j));
             if fits(&after) {
                 let names = [&axis.name, &other.name].map(String::as_str).join(" and ");
                 return Some((format!("axes: all fits when {names} are exchanged"), after));

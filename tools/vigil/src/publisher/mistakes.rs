@@ -81,14 +81,18 @@ fn since(t_ns: u64) -> u64 {
 #[rustfmt::skip]
 const CASES: &[Case] = &[
     Case { what: "all times in us", check: "refused: behind", detail: "in ns",
-        mistake: |_, f| { f.frame.header.t_schedule_ns /= 1000; f.frame.header.t_capture_ns /= 1000 } },
+        mistake: |_, f| {
+            f.frame.header.t_schedule_ns /= 1000;
+            f.frame.header.t_capture_ns /= 1000;
+        } },
     Case { what: "capture in us", check: "capture clock", detail: "it is in us, ns are wanted",
         mistake: |_, f| f.frame.header.t_capture_ns /= 1000 },
     Case { what: "capture in ms", check: "capture clock", detail: "it is in ms, ns are wanted",
         mistake: |_, f| f.frame.header.t_capture_ns /= MS },
     Case { what: "capture 0", check: "capture clock", detail: "never changes",
         mistake: |_, f| f.frame.header.t_capture_ns = 0 },
-    Case { what: "schedule constant", check: "refused: early", detail: "header.t_schedule_ns advance",
+    Case { what: "schedule constant", check: "refused: early",
+        detail: "header.t_schedule_ns advance",
         mistake: |_, f| f.frame.header.t_schedule_ns = 3_600_000 * MS },
     Case { what: "wall clock in schedule", check: "refused: ahead", detail: "not the time of day",
         mistake: |_, f| f.frame.header.t_schedule_ns += 1_700_000_000_000 * MS },
@@ -110,7 +114,8 @@ const CASES: &[Case] = &[
         mistake: |k, f| f.frame.header.seq = k.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 2 },
     Case { what: "another schema", check: "refused: schema", detail: "generated types",
         mistake: |_, f| f.frame.header.schema ^= 1 },
-    Case { what: "another robot's channels", check: "refused: robot", detail: "another channel list",
+    Case { what: "another robot's channels", check: "refused: robot",
+        detail: "another channel list",
         mistake: |_, f| f.frame.robot_hash ^= 1 },
     Case { what: "no command", check: "cmd_curv", detail: "never marked as valid",
         mistake: |_, f| f.frame.command_valid = 0 },
@@ -135,7 +140,8 @@ const CASES: &[Case] = &[
         mistake: |k, f| if k > 150 { f.frame.channel[X] += 300.0 } },
     Case { what: "command in cm/s", check: "cmd_speed", detail: "Is the unit right?",
         mistake: |_, f| f.frame.command[1] *= 100.0 },
-    Case { what: "command's axes exchanged", check: "meaning", detail: "cmd_curv and cmd_speed are exchanged",
+    Case { what: "command's axes exchanged", check: "meaning",
+        detail: "cmd_curv and cmd_speed are exchanged",
         mistake: |_, f| f.frame.command.swap(0, 1) },
     Case { what: "command reversed", check: "meaning", detail: "cmd_curv has the other sign",
         mistake: |_, f| f.frame.command[0] = -f.frame.command[0] },
