@@ -36,7 +36,7 @@ fn detector() -> Detector {
         id: 0,
         frames: (0..15_000).map(|i| frame(i, f64::INFINITY)).collect(),
     };
-    let (model, _) = learn(&[healthy], &[], f64::INFINITY, &robot).unwrap();
+    let (model, _) = learn(&[healthy], &[], f64::INFINITY, &robot, &[]).unwrap();
     Detector::of_channels(&model, &robot, &detect::Settings::default()).unwrap()
 }
 

@@ -190,3 +190,29 @@ fn a_warm_up_is_neither_learned_from_nor_watched() {
     };
     assert!(found(&model, &without, &cold(2, 60.0)).is_some());
 }
+
+#[test]
+fn an_angle_is_the_same_after_a_period() {
+    let mut robot = robot(0.0);
+    robot.channel[0].period = Some(360.0);
+    let mut observer = Observer::new(&robot);
+    let mut seen = Vec::new();
+    // The first frame only says where the first observation begins; five make one.
+    let read = [
+        0.0, 1.0, -1.0, 2.0, 719.0, 361.0, 179.5, -179.5, 180.0, 181.0, -179.0,
+    ];
+    for (i, degrees) in read.into_iter().enumerate() {
+        let mut frame = SensorFrame::default();
+        frame.header.t_capture_ns = i as u64 * 20_000_000;
+        (frame.header.seq, frame.run_id) = (i as u64, 1);
+        frame.set_channel(0, degrees);
+        if observer.push(&frame).complete {
+            seen.push(observer.history().ago(0).unwrap().values[0].unwrap());
+        }
+    }
+    let expected = [0.4, -179.6];
+    assert_eq!(seen.len(), expected.len());
+    for (seen, expected) in seen.into_iter().zip(expected) {
+        assert!((seen - expected).abs() < 1e-9, "{seen} {expected}");
+    }
+}

@@ -53,7 +53,7 @@ fn report(wheel_rates: bool, drive: impl Fn(f64) -> [f64; 2]) -> Isolability {
         frames.push(frame);
     }
     let runs = [Run { id: 0, frames }];
-    let (_, report) = learn(&runs, &[], f64::INFINITY, &robot(wheel_rates)).unwrap();
+    let (_, report) = learn(&runs, &[], f64::INFINITY, &robot(wheel_rates), &[]).unwrap();
     report.isolability.unwrap()
 }
 
