@@ -37,11 +37,7 @@ struct Fold {
 ///
 /// # Errors
 /// Groups that are too few, or without which there is nothing to learn from.
-pub(super) fn score(
-    task: &Task<'_>,
-    labels: &[Label],
-    false_alarm_interval_h: f64,
-) -> Result<Score, CommandError> {
+pub(super) fn score(task: &Task<'_>, labels: &[Label]) -> Result<Score, CommandError> {
     let ids: Vec<u32> = task.runs.iter().map(|run| run.id).collect();
     let used = labels.iter().filter(|label| ids.contains(&label.run));
     let groups: BTreeSet<&str> = used.map(|label| label.group.as_str()).collect();
@@ -61,7 +57,7 @@ pub(super) fn score(
         },
         tree,
         settings: detect::Settings {
-            false_alarm_interval_h,
+            false_alarm_interval_h: task.false_alarm_interval_h,
             ..detect::Settings::default()
         },
     };
@@ -96,7 +92,7 @@ impl CrossValidation<'_> {
             .filter(of_group)
             .map(|run| run.id)
             .collect();
-        let (model, _) = learn_channels::learn(task, &left_out)?;
+        let (model, _) = learn_channels::learn(task, &left_out, None)?;
         let refuse = |error: &dyn std::fmt::Display| {
             CommandError::usage(format!("without the group '{group}': {error}"))
         };

@@ -17,7 +17,7 @@ use vigil_robot::learned::model::Provenance;
 use vigil_robot::{Description, RobotModel};
 
 use super::files::{check_place, file_name, write_whole};
-use super::offline::{RobotArgs, load_model};
+use super::offline::{RobotArgs, hours, load_model};
 use vigil_terminal::{CommandError, Outcome};
 
 use super::learn_channels;
@@ -73,11 +73,11 @@ pub struct Args {
     /// of channels.
     #[arg(long, requires = "runs")]
     cross_validate: bool,
-    /// Mean time between false alarms, h, to cross-validate with.
+    /// Mean time between false alarms, h, for which a model of channels is judged.
     #[arg(
         long,
         value_name = "H",
-        requires = "cross_validate",
+        value_parser = hours,
         default_value_t = detect::Settings::default().false_alarm_interval_h
     )]
     false_alarm_interval: f64,
@@ -285,7 +285,8 @@ fn channels(
         test_fraction: args.test_fraction,
         seed: args.seed,
         until_s: args.until.unwrap_or(f64::INFINITY),
-        cross_validate: args.cross_validate.then_some(args.false_alarm_interval),
+        false_alarm_interval_h: args.false_alarm_interval,
+        cross_validate: args.cross_validate,
         json: args.json,
         labels: labels.as_deref(),
     })

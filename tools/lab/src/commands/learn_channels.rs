@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Serialize;
 use vigil_evaluation::scoring::Score;
-use vigil_learning::channel_learning::{self, LabelledRun, Report};
+use vigil_learning::channel_learning::{self, LabelledRun, Log, Report};
 use vigil_learning::split::split_runs;
 use vigil_recording::frames::Run;
 use vigil_recording::labels::Label;
@@ -40,9 +40,10 @@ pub(super) struct Task<'a> {
     pub seed: u64,
     /// End of what is learned from in each run, s.
     pub until_s: f64,
-    /// Mean time between false alarms, h, with which to cross-validate; none if that was not asked
-    /// for.
-    pub cross_validate: Option<f64>,
+    /// Mean time between false alarms, h, of what is said of the model.
+    pub false_alarm_interval_h: f64,
+    /// Diagnose each group by a model of the others.
+    pub cross_validate: bool,
     /// Print JSON.
     pub json: bool,
 }
@@ -65,7 +66,7 @@ struct Document<'a> {
 /// A log that cannot support a model; an output that cannot be written.
 pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
     let held_out = held_out(task);
-    let (mut model, report) = learn(task, &held_out)?;
+    let (mut model, report) = learn(task, &held_out, Some(task.false_alarm_interval_h))?;
     model.provenance = Provenance {
         frames_file: file_name(task.frames),
         seed: task.seed,
@@ -79,12 +80,9 @@ pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
     for warning in &report.warnings {
         eprintln!("warning: {warning}");
     }
-    let score = match (task.cross_validate, task.labels) {
-        (Some(interval_h), Some(labels)) => {
-            Some(cross_validation::score(task, labels, interval_h)?)
-        }
-        _ => None,
-    };
+    let labels = task.labels.filter(|_| task.cross_validate);
+    let score = labels.map(|labels| cross_validation::score(task, labels));
+    let score = score.transpose()?;
     let printed = if task.json {
         output::json(&Document {
             schema_version: 1,
@@ -134,8 +132,13 @@ fn held_out(task: &Task<'_>) -> Vec<u32> {
     ids.filter(is_left_out).collect()
 }
 
-/// Learns from the runs that are not held out.
-pub(super) fn learn(task: &Task<'_>, held_out: &[u32]) -> Result<(Model, Report), CommandError> {
+/// Learns from the runs that are not held out; if asked for, with a study of isolability at so many
+/// hours between false alarms.
+pub(super) fn learn(
+    task: &Task<'_>,
+    held_out: &[u32],
+    isolability_at_h: Option<f64>,
+) -> Result<(Model, Report), CommandError> {
     let faulty = match task.labels {
         Some(labels) => labelled_runs(task.runs, labels, task.robot)?,
         None => Vec::new(),
@@ -144,18 +147,13 @@ pub(super) fn learn(task: &Task<'_>, held_out: &[u32]) -> Result<(Model, Report)
     let healthy: Vec<Run> = healthy.collect();
     let is_learned = |label: &LabelledRun<'_>| !held_out.contains(&label.run.id);
     let labelled: Vec<LabelledRun<'_>> = faulty.into_iter().filter(is_learned).collect();
-    channel_learning::learn(&healthy, held_out, task.until_s, task.robot, &labelled)
+    let log = Log {
+        healthy: &healthy,
+        labelled: &labelled,
+        held_out,
+        until_s: task.until_s,
+        isolability_at_h,
+    };
+    channel_learning::learn(&log, task.robot)
         .map_err(|error| CommandError::usage(format!("{}: {error}", task.frames.display())))
-}
-
-#[cfg(test)]
-mod tests {
-    use vigil_diagnosis::detect::Settings;
-    use vigil_learning::channel_learning::FALSE_ALARM_INTERVAL_H;
-
-    #[test]
-    fn the_report_is_of_the_detectors_own_interval_between_false_alarms() {
-        let settings = Settings::default();
-        assert_eq!(FALSE_ALARM_INTERVAL_H, settings.false_alarm_interval_h);
-    }
 }

@@ -14,7 +14,7 @@ use vigil_robot::Description;
 use vigil_robot::channel_model::channel::commands;
 use vigil_robot::channel_model::law::BLOCKS;
 use vigil_robot::channel_model::signature::{
-    Evidence, MEANS_MAX, Means, Phase, Signature, Signatures, means,
+    Evidence, MEANS_MAX, Means, Phase, SD_MIN, Signature, Signatures, means,
 };
 use vigil_robot::channel_model::window::Window;
 use vigil_robot::channel_model::{Model, Scales};
@@ -36,8 +36,6 @@ const INDEPENDENT: f64 = 0.1;
 const FOUND: f64 = 5.0;
 const FOUND_RATIO: f64 = 1.2;
 const FOUND_S: f64 = 10.0;
-/// Smallest deviation of a mean.
-const SD_MIN: f64 = 1e-3;
 
 /// A run with a declared fault.
 #[derive(Debug, Clone)]

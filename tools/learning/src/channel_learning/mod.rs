@@ -33,7 +33,7 @@ use vigil_robot::learned::model::Provenance;
 
 use crate::data_hash::data_hash;
 use crate::plausibility::{self, RunCheck, RunDoubt};
-pub use isolability::{FALSE_ALARM_INTERVAL_H, Isolability};
+pub use isolability::Isolability;
 pub use labelled::{FaultFit, LabelledRun};
 use record::{FOLDS, Record};
 pub use report::{ChannelFit, Report};
@@ -120,18 +120,42 @@ pub enum LogError {
     },
 }
 
-/// Learns a model from the runs that are not in `held_out`, up to `until_s` of each; from runs of
-/// declared faults how these show.
+/// What to learn from.
+#[derive(Debug, Clone, Copy)]
+pub struct Log<'a> {
+    /// Runs without a fault, and what comes before it of those with one.
+    pub healthy: &'a [Run],
+    /// Runs of declared faults.
+    pub labelled: &'a [LabelledRun<'a>],
+    /// Ids of the runs to leave out.
+    pub held_out: &'a [u32],
+    /// End of what is learned from in each run, s.
+    pub until_s: f64,
+    /// Mean time between false alarms, h, for which [`Report::isolability`] is found; none: it is
+    /// not.
+    pub isolability_at_h: Option<f64>,
+}
+
+impl<'a> Log<'a> {
+    /// All of these runs, none of which has a fault.
+    #[must_use]
+    pub const fn of_healthy(runs: &'a [Run]) -> Self {
+        Self {
+            healthy: runs,
+            labelled: &[],
+            held_out: &[],
+            until_s: f64::INFINITY,
+            isolability_at_h: None,
+        }
+    }
+}
+
+/// Learns a model of a robot.
 ///
 /// # Errors
 /// [`LogError`] naming what is missing.
-pub fn learn(
-    runs: &[Run],
-    held_out: &[u32],
-    until_s: f64,
-    robot: &Description,
-    labelled: &[LabelledRun<'_>],
-) -> Result<(Model, Report), LogError> {
+pub fn learn(log: &Log<'_>, robot: &Description) -> Result<(Model, Report), LogError> {
+    let (runs, held_out, until_s) = (log.healthy, log.held_out, log.until_s);
     let (left_out, learned): (Vec<&Run>, Vec<&Run>) =
         runs.iter().partition(|run| held_out.contains(&run.id));
     if learned.is_empty() {
@@ -183,19 +207,28 @@ pub fn learn(
         }
     }
     joint::fit(&mut model, &mut models, &records, &scales);
-    report.faults = labelled::fit(&mut model, (&models, &records), labelled, (robot, &scales));
+    report.faults = labelled::fit(
+        &mut model,
+        (&models, &records),
+        log.labelled,
+        (robot, &scales),
+    );
     for part in &mut models {
         part.signatures.clone_from(&model.signatures);
     }
     calibrate::fit(&mut model, &mut models, &records, robot);
     calibrate::tell(&mut report.bounds, &model);
-    report.isolability = isolability::report(&isolability::Task {
-        model: &model,
-        models: &models,
-        records: &records,
-        scales: &scales,
-        robot,
-    });
+    let study = |interval_h| {
+        isolability::report(&isolability::Task {
+            model: &model,
+            models: &models,
+            records: &records,
+            scales: &scales,
+            robot,
+            interval_h,
+        })
+    };
+    report.isolability = log.isolability_at_h.and_then(study);
     report.finish(&model);
     Ok((model.sealed(), report))
 }

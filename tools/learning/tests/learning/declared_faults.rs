@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::SensorFrame;
-use vigil_learning::channel_learning::{LabelledRun, Report, learn};
+use vigil_learning::channel_learning::{LabelledRun, Log, Report, learn};
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_robot::channel_model::{Model, Monitor, Observer, components};
@@ -79,7 +79,11 @@ fn labelled<'a>(run: &'a Run, group: &'a str) -> LabelledRun<'a> {
 
 fn learned(robot: &Description, labelled: &[LabelledRun<'_>]) -> (Model, Report) {
     let healthy = [run(0, 700.0, 0.0, NOTHING)];
-    learn(&healthy, &[], f64::INFINITY, robot, labelled).unwrap()
+    let log = Log {
+        labelled,
+        ..Log::of_healthy(&healthy)
+    };
+    learn(&log, robot).unwrap()
 }
 
 /// First alarm of 24 h between false ones, s, and the most probable component two seconds later.
@@ -181,7 +185,7 @@ fn a_warm_up_is_neither_learned_from_nor_watched() {
         }
         run
     };
-    let (model, _) = learn(&[cold(0, 700.0)], &[], f64::INFINITY, &robot, &[]).unwrap();
+    let (model, _) = learn(&Log::of_healthy(&[cold(0, 700.0)]), &robot).unwrap();
     assert!((model.channel[1].variance[0].sqrt() - NOISE / 5_f64.sqrt()).abs() < 0.003);
     assert_eq!(found(&model, &robot, &cold(2, 60.0)), None);
     let without = Description {
