@@ -51,7 +51,7 @@ pub mod tree;
 pub mod window;
 
 pub use channel::{Channel, Regressor, Scales, Term};
-pub use component::{Component, Quantity, Target, components, drives, targets};
+pub use component::{Component, Places, Quantity, Target, components, drives, targets};
 pub use coverage::{Combinations, Range};
 pub use model::Model;
 pub use monitor::Monitor;

@@ -196,12 +196,16 @@ fn a_declared_fault_has_a_name_of_its_own_and_shows_in_channels_that_are_there()
     assert_eq!(made.nodes()[group].name, "LEFT");
     assert_eq!(made.nodes()[leaf].fault.as_deref(), Some("fault:tyre"));
     for (fault, said) in [
-        ("fault = [{ name = 'enc_L' }]", "the name is taken"),
+        ("fault = [{ name = 'enc_L' }]", "is taken"),
+        ("fault = [{ name = 'a' }, { name = 'a' }]", "is taken"),
+        ("fault = [{ name = 'UNKNOWN' }]", "a word of Vigil's own"),
+        ("fault = [{ name = 'a', group = 'enc_L' }]", "is taken"),
+        ("fault = [{ name = 'a', group = '' }]", "'' is no name"),
+        ("fault = [{ name = 'WHEEL_L' }]", "is taken"),
         (
-            "fault = [{ name = 'a' }, { name = 'a' }]",
-            "the name is taken",
+            "fault = [{ name = 'a', shows = ['enc_L', 'enc_L'] }]",
+            "'enc_L' twice",
         ),
-        ("fault = [{ name = 'ND' }]", "is not ND"),
         ("fault = [{ name = 'flat tyre' }]", "letters, digits"),
         (
             "fault = [{ name = 'tyre', shows = ['enc_X'] }]",

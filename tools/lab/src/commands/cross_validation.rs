@@ -65,7 +65,16 @@ pub(super) fn score(task: &Task<'_>, labels: &[Label]) -> Result<Score, CommandE
     let folds = validation.folds(&groups)?;
     let threshold = folds.iter().map(|fold| fold.alarm_log_odds);
     let alarm_log_odds = threshold.fold(f64::NEG_INFINITY, f64::max);
-    let cases: Vec<Case> = folds.into_iter().flat_map(|fold| fold.cases).collect();
+    // Each model has its own threshold: told from that, all are alike.
+    let cases = folds.into_iter().flat_map(|fold| {
+        let apart = alarm_log_odds - fold.alarm_log_odds;
+        let mut cases = fold.cases;
+        for verdict in cases.iter_mut().flat_map(|case| &mut case.verdicts) {
+            verdict.log_odds += apart;
+        }
+        cases
+    });
+    let cases: Vec<Case> = cases.collect();
     let taxonomy = &validation.vocabulary.taxonomy;
     Ok(scoring::score(&cases, taxonomy, alarm_log_odds))
 }
@@ -92,10 +101,11 @@ impl CrossValidation<'_> {
             .filter(of_group)
             .map(|run| run.id)
             .collect();
-        let (model, _) = learn_channels::learn(task, &left_out, None)?;
         let refuse = |error: &dyn std::fmt::Display| {
             CommandError::usage(format!("without the group '{group}': {error}"))
         };
+        let learned = learn_channels::learn(task, &left_out, None);
+        let (model, _) = learned.map_err(|error| refuse(&error))?;
         let settings = &self.settings;
         let detector = Detector::of_channels(&model, task.robot, settings);
         let detector = detector.map_err(|error| refuse(&error))?;

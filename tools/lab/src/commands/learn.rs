@@ -171,6 +171,11 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
         }
         return channels(args, frames_file, out, &robot);
     };
+    if args.cross_validate {
+        let refused = "--cross-validate: this robot has no model of channels; score the runs that are \
+                       left out with `vigil evaluate`";
+        return Err(CommandError::usage(refused));
+    }
     let labels = labels::read(labels_file, &robot).map_err(CommandError::usage)?;
     let runs = frames::read(frames_file, &robot).map_err(CommandError::usage)?;
     warn_slow(&runs, &labels, frames_file, &robot);
@@ -289,6 +294,7 @@ fn channels(
         cross_validate: args.cross_validate,
         json: args.json,
         labels: labels.as_deref(),
+        labels_file: args.runs.as_deref(),
     })
 }
 

@@ -30,6 +30,8 @@ pub(super) struct Task<'a> {
     pub runs: &'a [Run],
     /// Labels of the runs.
     pub labels: Option<&'a [Label]>,
+    /// Their file, for the record.
+    pub labels_file: Option<&'a Path>,
     /// Frames file, for messages.
     pub frames: &'a Path,
     /// Where to write the model.
@@ -69,20 +71,21 @@ pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
     let (mut model, report) = learn(task, &held_out, Some(task.false_alarm_interval_h))?;
     model.provenance = Provenance {
         frames_file: file_name(task.frames),
+        labels_file: task.labels_file.map(file_name).unwrap_or_default(),
         seed: task.seed,
         test_fraction: task.test_fraction,
         software_version: env!("CARGO_PKG_VERSION").to_owned(),
         ..model.provenance
     };
     let model = model.sealed();
+    let labels = task.labels.filter(|_| task.cross_validate);
+    let score = labels.map(|labels| cross_validation::score(task, labels));
+    let score = score.transpose()?;
     let text = model.to_toml().map_err(CommandError::failure)?;
     write_whole(task.out, &text)?;
     for warning in &report.warnings {
         eprintln!("warning: {warning}");
     }
-    let labels = task.labels.filter(|_| task.cross_validate);
-    let score = labels.map(|labels| cross_validation::score(task, labels));
-    let score = score.transpose()?;
     let printed = if task.json {
         output::json(&Document {
             schema_version: 1,
@@ -147,9 +150,14 @@ pub(super) fn learn(
     let healthy: Vec<Run> = healthy.collect();
     let is_learned = |label: &LabelledRun<'_>| !held_out.contains(&label.run.id);
     let labelled: Vec<LabelledRun<'_>> = faulty.into_iter().filter(is_learned).collect();
+    let groups = task.labels.unwrap_or_default().iter();
+    let groups: Vec<(u32, String)> = groups
+        .map(|label| (label.run, label.group.clone()))
+        .collect();
     let log = Log {
         healthy: &healthy,
         labelled: &labelled,
+        groups: &groups,
         held_out,
         until_s: task.until_s,
         isolability_at_h,

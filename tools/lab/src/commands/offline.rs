@@ -283,7 +283,7 @@ impl FilterArgs {
         );
         let (model, frames) = (self.model.display(), self.frames.display());
         let all: Vec<&Run> = of.runs.iter().collect();
-        let data = data_hash(&all, f64::INFINITY);
+        let data = data_hash(&all, f64::INFINITY, &[]);
         vec![
             ("command", words.join(" ")),
             ("version", env!("CARGO_PKG_VERSION").to_owned()),

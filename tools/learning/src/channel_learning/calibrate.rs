@@ -1,6 +1,7 @@
 //! The tails of the log-odds without a fault.
 
 use vigil_robot::Description;
+use vigil_robot::channel_model::bank::IMPOSSIBLE;
 use vigil_robot::channel_model::model::{Class, FAULT_RATE_1_H, Tail};
 use vigil_robot::channel_model::{Model, Monitor};
 use vigil_robot::learned::calibration::SLOPE_UNKNOWN;
@@ -38,6 +39,7 @@ pub(super) fn fit(
         if !model.signatures.is_empty() {
             // They are seen as live: what is suspected of the other classes is known.
             let mut by_class = maxima(models, records, (robot, channels), Monitor::classes);
+            by_class[Class::Signature as usize].raise(IMPOSSIBLE);
             let signature = [Class::Signature].into_iter();
             let tails = self::tails(signature, &mut by_class, (channels, form));
             extend(model, models, &tails);

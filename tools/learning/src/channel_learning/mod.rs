@@ -127,6 +127,9 @@ pub struct Log<'a> {
     pub healthy: &'a [Run],
     /// Runs of declared faults.
     pub labelled: &'a [LabelledRun<'a>],
+    /// Names of groups by the ids of runs: those of one group are never judged by each other. A run
+    /// without one is a group of its own.
+    pub groups: &'a [(u32, String)],
     /// Ids of the runs to leave out.
     pub held_out: &'a [u32],
     /// End of what is learned from in each run, s.
@@ -143,6 +146,7 @@ impl<'a> Log<'a> {
         Self {
             healthy: runs,
             labelled: &[],
+            groups: &[],
             held_out: &[],
             until_s: f64::INFINITY,
             isolability_at_h: None,
@@ -155,26 +159,20 @@ impl<'a> Log<'a> {
 /// # Errors
 /// [`LogError`] naming what is missing.
 pub fn learn(log: &Log<'_>, robot: &Description) -> Result<(Model, Report), LogError> {
-    let (runs, held_out, until_s) = (log.healthy, log.held_out, log.until_s);
-    let (left_out, learned): (Vec<&Run>, Vec<&Run>) =
-        runs.iter().partition(|run| held_out.contains(&run.id));
+    let until_s = log.until_s;
+    let is_left_out = |run: &&Run| log.held_out.contains(&run.id);
+    let (left_out, learned): (Vec<&Run>, Vec<&Run>) = log.healthy.iter().partition(is_left_out);
     if learned.is_empty() {
         return Err(LogError::NoRuns);
     }
     let doubt = doubt(&learned, until_s, robot)?;
-    let records = record::all(&learned, until_s, robot);
+    let records = record::grouped(&learned, log.groups, until_s, robot);
     let command = excitation::ranges(&records, robot)?;
     let exposure_s = records.iter().map(Record::moving_s).sum();
-    let provenance = Provenance {
-        data_hash: data_hash(&learned, until_s),
-        runs_learned: learned.iter().map(|run| run.id).collect(),
-        runs_held_out: left_out.iter().map(|run| run.id).collect(),
-        until_s: until_s.is_finite().then_some(until_s),
-        ..Provenance::default()
-    };
+    let provenance = provenance(log, &learned, &left_out);
     let mut model = blank(robot, exposure_s, command, provenance);
     model.rest_s = record::rest_s(&records, lags(robot.interval_s));
-    let mut report = Report::new(&model, runs.len() - left_out.len(), left_out.len());
+    let mut report = Report::new(&model, learned.len(), left_out.len());
     report.warnings.extend(doubt);
     let beginnings = learned.iter().map(|run| (*run, until_s));
     report
@@ -200,6 +198,10 @@ pub fn learn(log: &Log<'_>, robot: &Description) -> Result<(Model, Report), LogE
         let told = |set: &mut Vec<Term>| set.retain(|term| !untold.contains(term));
         terms.iter_mut().for_each(told);
         let (channel, of_parts) = fit(target, place, &terms, &records, (&models, &scales))?;
+        let astray = target
+            .period
+            .map_or(0.0, |period| record::part_astray(&records, place, period));
+        report.astray(&channel.name, astray);
         report.add(&channel, &target.unit);
         model.channel.push(channel);
         for (part, channel) in models.iter_mut().zip(of_parts) {
@@ -233,6 +235,23 @@ pub fn learn(log: &Log<'_>, robot: &Description) -> Result<(Model, Report), LogE
     Ok((model.sealed(), report))
 }
 
+fn provenance(log: &Log<'_>, learned: &[&Run], left_out: &[&Run]) -> Provenance {
+    let labels = log.labelled.iter().map(|label| {
+        let LabelledRun { run, onset_s, .. } = label;
+        format!("{} {} {onset_s}", run.id, label.fault)
+    });
+    let labels: Vec<String> = labels.collect();
+    let runs = log.labelled.iter().map(|label| label.run);
+    let runs: Vec<&Run> = learned.iter().copied().chain(runs).collect();
+    Provenance {
+        data_hash: data_hash(&runs, log.until_s, &labels),
+        runs_learned: learned.iter().map(|run| run.id).collect(),
+        runs_held_out: left_out.iter().map(|run| run.id).collect(),
+        until_s: log.until_s.is_finite().then_some(log.until_s),
+        ..Provenance::default()
+    }
+}
+
 /// A model of which nothing but the command is known.
 fn blank(
     robot: &Description,
@@ -246,6 +265,7 @@ fn blank(
         hash: String::new(),
         robot: robot.name.clone(),
         interval_s: robot.interval_s,
+        warm_up_s: robot.warm_up_s,
         exposure_s,
         rest_s: 0.0,
         widened: widening(exposure_s, robot.interval_s),
@@ -255,6 +275,7 @@ fn blank(
         channel: Vec::new(),
         direction: Vec::new(),
         scatter: Scatter::default(),
+        declared: robot.fault.clone(),
         signatures: Signatures::default(),
         tail: Vec::new(),
         calibration: Vec::new(),
@@ -333,6 +354,7 @@ fn weights(
 ) -> Result<(Channel, Vec<Channel>), LogError> {
     let mut channel = Channel {
         name: target.name.clone(),
+        period: target.period,
         terms: terms.to_vec(),
         weights: vec![0.0; terms.len()],
         variance: [0.0; 3],

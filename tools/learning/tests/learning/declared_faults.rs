@@ -127,7 +127,7 @@ fn a_fault_of_labelled_runs_is_named_in_a_run_that_was_not_learned_from() {
     assert_eq!(report.faults.len(), 1);
     let fit = &report.faults[0];
     assert_eq!(
-        (fit.fault.as_str(), fit.runs, fit.runs_found),
+        (fit.fault.as_str(), fit.runs_with_onset, fit.runs_found),
         ("engine", 6, 6)
     );
     assert!(fit.is_used);
@@ -147,8 +147,77 @@ fn runs_of_one_group_alone_vouch_for_nothing() {
     let labels: Vec<LabelledRun<'_>> = runs.iter().map(|run| labelled(run, "monday")).collect();
     let (model, report) = learned(&robot(0.0), &labels);
     let fit = &report.faults[0];
-    assert_eq!((fit.runs, fit.runs_found, fit.is_used), (3, 0, false));
+    assert_eq!((fit.runs, fit.groups, fit.is_used), (3, 1, false));
+    assert!(fit.to_string().contains("one group"), "{fit}");
     assert!(model.signatures.is_empty());
+}
+
+#[test]
+fn runs_that_are_faulty_from_the_beginning_teach_nothing() {
+    let runs: Vec<Run> = (1..5).map(|id| run(id, 60.0, 1.0, ENGINE)).collect();
+    let groups = ["monday", "tuesday", "friday", "sunday"];
+    let label = |(run, group)| LabelledRun {
+        onset_s: 0.0,
+        ..labelled(run, group)
+    };
+    let labels: Vec<LabelledRun<'_>> = runs.iter().zip(groups).map(label).collect();
+    let (model, report) = learned(&robot(0.0), &labels);
+    let fit = &report.faults[0];
+    assert_eq!((fit.runs, fit.runs_with_onset, fit.is_used), (4, 0, false));
+    assert!(model.signatures.is_empty());
+}
+
+/// Probability that something is wrong, in the median of a healthy run.
+fn usual_p_fault(model: &Model, robot: &Description) -> f64 {
+    let mut monitor = Monitor::new(model, robot, Channels::PoseEncoders, 1.0).unwrap();
+    let mut observer = Observer::new(robot);
+    let mut found = Vec::new();
+    for frame in &run(90, 200.0, 0.0, NOTHING).frames {
+        if observer.push(frame).complete {
+            monitor.step(observer.history());
+            found.push(1.0 / (1.0 + (-monitor.report().log_odds).exp()));
+        }
+    }
+    found.sort_by(f64::total_cmp);
+    found[found.len() / 2]
+}
+
+#[test]
+fn a_signature_leaves_a_healthy_robot_in_peace() {
+    let robot = robot(0.0);
+    let (without, _) = learned(&robot, &[]);
+    let usual = usual_p_fault(&without, &robot);
+    for scale in [0.2, 0.35, 0.6, 1.0, 2.0] {
+        let runs: Vec<Run> = (1..5).map(|id| run(id, 60.0, scale, ENGINE)).collect();
+        let groups = ["monday", "tuesday", "friday", "sunday"];
+        let labels = runs
+            .iter()
+            .zip(groups)
+            .map(|(run, group)| labelled(run, group));
+        let (model, _) = learned(&robot, &labels.collect::<Vec<_>>());
+        let found = usual_p_fault(&model, &robot);
+        assert!(
+            found < 2.0 * usual + 0.01,
+            "{scale}: {found}, without {usual}"
+        );
+    }
+}
+
+#[test]
+fn a_model_is_of_the_faults_that_were_declared_when_it_was_learned() {
+    let robot = robot(0.0);
+    let (model, _) = learned(&robot, &[]);
+    model.check_robot(&robot).unwrap();
+    let mut other = robot.clone();
+    other.fault[1].shows.pop();
+    let refused = model.check_robot(&other).unwrap_err().to_string();
+    assert!(refused.contains("rudder (shows in a b)"), "{refused}");
+    let mut other = robot.clone();
+    other.warm_up_s = 3.0;
+    assert!(model.check_robot(&other).is_err());
+    let mut other = robot;
+    other.channel[2].period = Some(360.0);
+    assert!(model.check_robot(&other).is_err());
 }
 
 #[test]
