@@ -4,8 +4,8 @@ use vigil_blocks::{CHANNELS, COMMANDS, SensorFrame, fnv1a};
 
 use vigil_recording::frames::Run;
 
-/// Hash of what the frames up to `until_s` hold, and of labels: ids of the runs, times, commands and
-/// channels, as far as they were measured.
+/// Hash of what the frames up to `until_s` hold, and of labels: ids of the runs, times, commands
+/// and channels, as far as they were measured.
 #[must_use]
 pub fn data_hash(runs: &[&Run], until_s: f64, labels: &[String]) -> String {
     let mut hash = fnv1a::BASIS;

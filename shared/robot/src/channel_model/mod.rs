@@ -40,6 +40,7 @@ pub mod coverage;
 pub mod declared_faults;
 pub mod directions;
 pub mod fault_kind;
+mod identity;
 pub mod law;
 pub mod model;
 pub mod monitor;

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::channel::{Channel, Regressor, Term};
-use super::component::targets;
 use super::coverage::{Combinations, Range, widening};
 use super::fault_kind::FaultKind;
+use super::identity::{Identity, without_groups};
 use super::law::{Direction, Law};
 use super::observation::{DEPTH, History, SMOOTHING_S};
 use super::scatter::{Scatter, ScatterLaw};
@@ -212,41 +212,24 @@ impl Model {
     /// # Errors
     /// [`ModelError::Robot`].
     pub fn check_robot(&self, robot: &Description) -> Result<(), ModelError> {
-        let axes = |names: Vec<&str>| names.join(" ");
-        let channel = |(name, period): (&String, Option<f64>)| match period {
-            Some(period) => format!("{name} (period {period})"),
-            None => name.clone(),
+        let channels = self.channel.iter();
+        let of_model = Identity {
+            name: self.robot.clone(),
+            axes: self.command.iter().map(|axis| axis.name.clone()).collect(),
+            channels: channels.map(|one| (one.name.clone(), one.period)).collect(),
+            interval_s: self.interval_s,
+            warm_up_s: self.warm_up_s,
+            faults: without_groups(&self.declared),
         };
-        let of_model = shown(
-            &axes(self.command.iter().map(|axis| axis.name.as_str()).collect()),
-            self.channel
-                .iter()
-                .map(|one| channel((&one.name, one.period))),
-            (self.interval_s, self.warm_up_s),
-            &self.declared,
-        );
-        let of_robot = shown(
-            &axes(
-                robot
-                    .command
-                    .iter()
-                    .map(|axis| axis.name.as_str())
-                    .collect(),
-            ),
-            targets(robot)
-                .iter()
-                .map(|one| channel((&one.name, one.period))),
-            (robot.interval_s, robot.warm_up_s),
-            &robot.fault,
-        );
-        if self.robot == robot.name && of_model == of_robot {
+        let of_robot = Identity::of_robot(robot);
+        if of_model == of_robot {
             return Ok(());
         }
         Err(ModelError::Robot {
             model: self.robot.clone(),
-            model_wheels: of_model,
+            model_wheels: of_model.to_string(),
             robot: robot.name.clone(),
-            robot_wheels: of_robot,
+            robot_wheels: of_robot.to_string(),
         })
     }
 
@@ -364,8 +347,8 @@ impl ModelFile for Model {
         check_scatter(&self.scatter, count)?;
         if !self.signatures.fits(count) {
             let found = format!("{} faults", self.signatures.fault.len());
-            let allowed = "at most 8 faults of 1 to 8 phases, each with three numbers up to 1e9 for \
-                           each channel, and deviations from 1e-3";
+            let allowed = "at most 8 faults of 1 to 8 phases, each with three numbers up to 1e9 \
+                           for each channel, and deviations from 1e-3";
             return refuse("signatures", found, allowed);
         }
         for (i, one) in self.signatures.fault.iter().enumerate() {
@@ -378,29 +361,6 @@ impl ModelFile for Model {
         }
         self.tail.iter().try_for_each(check_tail)?;
         self.calibration.iter().try_for_each(check_calibration)
-    }
-}
-
-/// What tells one robot from another.
-fn shown(
-    axes: &str,
-    channels: impl Iterator<Item = String>,
-    (interval_s, warm_up_s): (f64, f64),
-    declared: &[DeclaredFault],
-) -> String {
-    let channels = channels.collect::<Vec<_>>().join(" ");
-    let mut out = format!("command {axes}; channels {channels}; {interval_s} s");
-    if warm_up_s > 0.0 {
-        out += &format!("; warm-up {warm_up_s} s");
-    }
-    let faults = declared.iter().map(|fault| match fault.shows[..] {
-        [] => fault.name.clone(),
-        _ => format!("{} (shows in {})", fault.name, fault.shows.join(" ")),
-    });
-    let faults = faults.collect::<Vec<_>>().join(" ");
-    match faults.is_empty() {
-        true => out,
-        false => out + "; faults " + &faults,
     }
 }
 

@@ -2,10 +2,10 @@
 //!
 //! The whitened residuals of each channel are averaged over the last 0.5, 2 and 4 s. A fault that
 //! has begun moves these means in a way that changes with its age, so a signature has a few phases.
-//! The evidence of a phase is linear in the means `v`, `w·v - c`, with `w = C⁻¹μ` and `c = ½ μᵀC⁻¹μ`
-//! for its mean `μ` and a covariance `C` (Fisher's discriminant): the log-likelihood ratio of two
-//! Gaussian laws with one covariance. Successive ratios are of the same residuals, so they are
-//! averaged over time and never summed.
+//! The evidence of a phase is linear in the means `v`, `w·v - c`, with `w = C⁻¹μ` and
+//! `c = ½ μᵀC⁻¹μ` for its mean `μ` and a covariance `C` (Fisher's discriminant): the log-likelihood
+//! ratio of two Gaussian laws with one covariance. Successive ratios are of the same residuals, so
+//! they are averaged over time and never summed.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,5 @@
-//! `vigil learn --cross-validate`: each group of runs diagnosed by a model that was learned from the
-//! others.
+//! `vigil learn --cross-validate`: each group of runs diagnosed by a model that was learned from
+//! the others.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -16,7 +16,7 @@ use vigil_robot::channel_model::tree::tree;
 use vigil_terminal::CommandError;
 use vigil_terminal::output::Progress;
 
-use super::learn_channels::{self, Task};
+use super::learn_task::{Task, learn};
 
 /// What stays the same over the groups.
 struct CrossValidation<'a> {
@@ -104,7 +104,7 @@ impl CrossValidation<'_> {
         let refuse = |error: &dyn std::fmt::Display| {
             CommandError::usage(format!("without the group '{group}': {error}"))
         };
-        let learned = learn_channels::learn(task, &left_out, None);
+        let learned = learn(task, &left_out, None);
         let (model, _) = learned.map_err(|error| refuse(&error))?;
         let settings = &self.settings;
         let detector = Detector::of_channels(&model, task.robot, settings);

@@ -10,8 +10,8 @@ use vigil_terminal::CommandError;
 /// The runs that are labelled with a fault.
 ///
 /// # Errors
-/// A run without a label, or with that of a fault that `robot` does not declare, or that begins after
-/// the run.
+/// A run without a label, or with that of a fault that `robot` does not declare, or that begins
+/// after the run.
 pub(super) fn labelled_runs<'a>(
     runs: &'a [Run],
     labels: &'a [Label],

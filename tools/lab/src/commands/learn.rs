@@ -21,6 +21,7 @@ use super::offline::{RobotArgs, hours, load_model};
 use vigil_terminal::{CommandError, Outcome};
 
 use super::learn_channels;
+use super::learn_task::Task;
 use vigil_terminal::output;
 
 /// Largest part of the runs that may be left out.
@@ -172,8 +173,8 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
         return channels(args, frames_file, out, &robot);
     };
     if args.cross_validate {
-        let refused = "--cross-validate: this robot has no model of channels; score the runs that are \
-                       left out with `vigil evaluate`";
+        let refused = "--cross-validate: this robot has no model of channels; score the runs \
+                       that are left out with `vigil evaluate`";
         return Err(CommandError::usage(refused));
     }
     let labels = labels::read(labels_file, &robot).map_err(CommandError::usage)?;
@@ -282,7 +283,7 @@ fn channels(
         Some(file) => Some(labels::read(file, robot).map_err(CommandError::usage)?),
         None => None,
     };
-    learn_channels::run(&learn_channels::Task {
+    learn_channels::run(&Task {
         robot,
         runs: &runs,
         frames: frames_file,

@@ -240,8 +240,8 @@ fn vector(means: &Means, n: usize) -> DVector<f64> {
     DVector::from_column_slice(&means[..n])
 }
 
-/// The labelled runs through the model of health: those that show it for a whole window, and then the
-/// fault.
+/// The labelled runs through the model of health: those that show it for a whole window, and then
+/// the fault.
 fn samples<'a>(
     model: &Model,
     labelled: &'a [LabelledRun<'a>],

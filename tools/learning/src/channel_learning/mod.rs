@@ -185,23 +185,14 @@ pub fn learn(log: &Log<'_>, robot: &Description) -> Result<(Model, Report), LogE
     let untold = untold(&records, &model, robot)?;
     report.untold(&untold, &model);
     let scales = Scales::new(model.sizes(), drives(robot), robot.interval_s);
-    let products = coverage::products(&terms::command(robot), &untold);
-    let ranges = model.command.clone();
-    let combinations = |part| coverage::combinations(&records, part, &products, &ranges);
-    model.combinations = combinations(None);
-    let mut models = excitation::of_parts(&records, &model);
-    for (part, seen) in models.iter_mut().enumerate() {
-        seen.combinations = combinations(Some(part));
-    }
+    let mut models = cover(&mut model, &records, robot, &untold);
     for (place, target) in all.iter().enumerate() {
         let mut terms = terms::candidates(target, robot);
         let told = |set: &mut Vec<Term>| set.retain(|term| !untold.contains(term));
         terms.iter_mut().for_each(told);
         let (channel, of_parts) = fit(target, place, &terms, &records, (&models, &scales))?;
-        let astray = target
-            .period
-            .map_or(0.0, |period| record::part_astray(&records, place, period));
-        report.astray(&channel.name, astray);
+        let astray = |period| record::part_astray(&records, place, period);
+        report.astray(&channel.name, target.period.map_or(0.0, astray));
         report.add(&channel, &target.unit);
         model.channel.push(channel);
         for (part, channel) in models.iter_mut().zip(of_parts) {
@@ -233,6 +224,24 @@ pub fn learn(log: &Log<'_>, robot: &Description) -> Result<(Model, Report), LogE
     report.isolability = log.isolability_at_h.and_then(study);
     report.finish(&model);
     Ok((model.sealed(), report))
+}
+
+/// Learns which commands the log covers; with models of the parts' others.
+fn cover(
+    model: &mut Model,
+    records: &[Record],
+    robot: &Description,
+    untold: &[Term],
+) -> Vec<Model> {
+    let products = coverage::products(&terms::command(robot), untold);
+    let ranges = model.command.clone();
+    let combinations = |part| coverage::combinations(records, part, &products, &ranges);
+    model.combinations = combinations(None);
+    let mut models = excitation::of_parts(records, model);
+    for (part, seen) in models.iter_mut().enumerate() {
+        seen.combinations = combinations(Some(part));
+    }
+    models
 }
 
 fn provenance(log: &Log<'_>, learned: &[&Run], left_out: &[&Run]) -> Provenance {

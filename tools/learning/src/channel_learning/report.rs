@@ -47,8 +47,8 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// Numbers of the model that stand on a bound set by hand.
     pub bounds: Bounds,
-    /// Which faults are detected and told apart; none if that was not asked for, or no window of the
-    /// log tells.
+    /// Which faults are detected and told apart; none if that was not asked for, or no window of
+    /// the log tells.
     pub isolability: Option<Isolability>,
 }
 

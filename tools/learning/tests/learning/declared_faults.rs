@@ -24,13 +24,35 @@ name = "kite"
 kinematics = "none"
 command = []
 warm_up_s = {warm_up_s:.1}
-measured = {{ pose = false, wheel_rates = false, steer = false, yaw_rate = false, currents = false }}
-channel = [{{ name = "a" }}, {{ name = "b" }}, {{ name = "c" }}, {{ name = "d" }}]
-fault = [
-  {{ name = "engine" }},
-  {{ name = "rudder", group = "SURFACE", shows = ["a", "b"] }},
-  {{ name = "flap", group = "SURFACE", shows = ["c", "d"] }},
-]
+[measured]
+pose = false
+wheel_rates = false
+steer = false
+
+[[channel]]
+name = "a"
+
+[[channel]]
+name = "b"
+
+[[channel]]
+name = "c"
+
+[[channel]]
+name = "d"
+
+[[fault]]
+name = "engine"
+
+[[fault]]
+name = "rudder"
+group = "SURFACE"
+shows = ["a", "b"]
+
+[[fault]]
+name = "flap"
+group = "SURFACE"
+shows = ["c", "d"]
 "#
     ))
     .unwrap()

@@ -6,8 +6,8 @@
 //! 1993, chapter 7). Each fault is put into windows of the log itself, whose residuals are added,
 //! and judged as the monitor does it: with the law, the threshold and the tails of the model.
 //!
-//! The sizes are stated, and a fault lasts. Not compared are noise, erratic and missing sensors, and
-//! declared faults.
+//! The sizes are stated, and a fault lasts. Not compared are noise, erratic and missing sensors,
+//! and declared faults.
 
 mod candidate;
 mod comparison;
