@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Taxonomy;
 use vigil_evaluation::scoring::field::{Scorer, Stretch};
-use vigil_learning::channel_learning;
+use vigil_learning::channel_learning::{self, Log};
 use vigil_recording::{frames, labels};
 use vigil_setup::Setup;
 
@@ -183,7 +183,7 @@ fn learned(
     let is_judged = |run: &frames::Run| run.id as usize % 2 == judged;
     let others = runs.iter().filter(|(_, run)| !is_judged(run));
     let others: Vec<frames::Run> = others.map(|(_, run)| run.clone()).collect();
-    let (model, _) = channel_learning::learn(&others, &[], f64::INFINITY, &robot, &[])?;
+    let (model, _) = channel_learning::learn(&Log::of_healthy(&others), &robot)?;
     let cases = runs.into_iter().filter(|(_, run)| is_judged(run));
     let cases = cases.map(|(ground, run)| Case {
         run,

@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use vigil_blocks::SensorFrame;
-use vigil_learning::channel_learning;
+use vigil_learning::channel_learning::{self, Log};
 use vigil_recording::frames::Run;
 use vigil_robot::channel_model::{Model, tree::tree};
 use vigil_robot::{Description, RobotModel};
@@ -70,7 +70,7 @@ impl Split {
             }
             other => return Err(format!("log '{other}': allowed are {}", LOGS.join(", ")).into()),
         };
-        let (model, _) = channel_learning::learn(&learned, &[], f64::INFINITY, &robot, &[])?;
+        let (model, _) = channel_learning::learn(&Log::of_healthy(&learned), &robot)?;
         let every = if log == "robotino" { FAULTY_EVERY } else { 1 };
         Ok(Self {
             setup: setup(robot, &model)?,

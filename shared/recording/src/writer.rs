@@ -97,7 +97,10 @@ fn unwritten(path: &Path, error: io::Error) -> TableError {
     }
 }
 
-/// To a millionth: finer than any sensor, and the text stays short.
+/// To twelve digits: finer than any sensor and any clock, and the text stays short.
 fn rounded(value: f64) -> f64 {
-    (value * 1e6).round() / 1e6
+    let digits = 11 - value.abs().max(1e-9).log10().floor() as i32;
+    let scale = 10_f64.powi(digits);
+    let rounded = (value * scale).round() / scale;
+    if rounded.is_finite() { rounded } else { value }
 }

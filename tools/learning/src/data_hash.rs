@@ -4,10 +4,10 @@ use vigil_blocks::{CHANNELS, COMMANDS, SensorFrame, fnv1a};
 
 use vigil_recording::frames::Run;
 
-/// Hash of what the frames up to `until_s` hold: ids of the runs, times, commands and channels, as
-/// far as they were measured.
+/// Hash of what the frames up to `until_s` hold, and of labels: ids of the runs, times, commands
+/// and channels, as far as they were measured.
 #[must_use]
-pub fn data_hash(runs: &[&Run], until_s: f64) -> String {
+pub fn data_hash(runs: &[&Run], until_s: f64, labels: &[String]) -> String {
     let mut hash = fnv1a::BASIS;
     for run in runs {
         hash = fnv1a::hash_u64(hash, u64::from(run.id));
@@ -20,6 +20,9 @@ pub fn data_hash(runs: &[&Run], until_s: f64) -> String {
                 hash = fnv1a::hash_u64(hash, value.to_bits());
             }
         }
+    }
+    for label in labels {
+        hash = fnv1a::hash(hash, label.as_bytes());
     }
     format!("fnv1a64:{hash:016x}")
 }
@@ -41,7 +44,7 @@ mod tests {
 
     #[test]
     fn what_was_measured_counts_and_what_comes_later_does_not() {
-        let hash = |run: &Run, until_s| data_hash(&[run], until_s);
+        let hash = |run: &Run, until_s| data_hash(&[run], until_s, &[]);
         let plain = hash(&run(|_| ()), f64::INFINITY);
         let late = |frame: &mut SensorFrame| {
             let is_late = frame.header.t_capture_ns > 2_000_000_000;

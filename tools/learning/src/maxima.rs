@@ -45,6 +45,17 @@ impl Maxima {
         self.found.len() as f64 * WINDOW_S
     }
 
+    /// Raises those of windows that say nothing to the least of all that say something.
+    pub fn raise(&mut self, nothing: f64) {
+        let said = self.found.iter().copied().filter(|value| *value > nothing);
+        let least = said.fold(f64::INFINITY, f64::min);
+        if least.is_finite() {
+            self.found
+                .iter_mut()
+                .for_each(|value| *value = value.max(least));
+        }
+    }
+
     /// True if they are not all the same.
     pub fn vary(&self) -> bool {
         let lowest = self.found.iter().copied().fold(f64::INFINITY, f64::min);

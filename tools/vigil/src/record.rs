@@ -179,6 +179,7 @@ impl<'a> Recording<'a> {
             return;
         }
         if let Err(error) = self.write(frame) {
+            eprintln!("error: {error}; nothing more is written: end with Ctrl-C");
             self.failed = Some(error);
         }
     }

@@ -9,7 +9,7 @@ use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{DetectionBelief, Entry, HealthyBelief, ParticleBlock, SensorFrame};
 use vigil_cycle::allocation::allocations;
 use vigil_diagnosis::detect::Detector;
-use vigil_learning::channel_learning::learn;
+use vigil_learning::channel_learning::{Log, learn};
 use vigil_recording::frames::Run;
 use vigil_robot::{Description, RobotModel};
 
@@ -36,7 +36,7 @@ fn detector() -> Detector {
         id: 0,
         frames: (0..15_000).map(|i| frame(i, f64::INFINITY)).collect(),
     };
-    let (model, _) = learn(&[healthy], &[], f64::INFINITY, &robot, &[]).unwrap();
+    let (model, _) = learn(&Log::of_healthy(&[healthy]), &robot).unwrap();
     Detector::of_channels(&model, &robot, &detect::Settings::default()).unwrap()
 }
 

@@ -342,7 +342,8 @@ impl Bank {
 
     /// A declared fault by its labelled runs.
     fn recognized(&self, fault: usize) -> Weighed {
-        let found = self.declared.evidence(fault);
+        // No evidence says nothing of a fault, and is no rare event.
+        let found = self.declared.evidence(fault).filter(|found| *found > 0.0);
         found.map_or(Weighed::NONE, |log_ratio| Weighed {
             log_ratio,
             age_s: self.window.block_s() * BLOCKS as f64,

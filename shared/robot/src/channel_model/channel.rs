@@ -175,6 +175,9 @@ pub type VarianceBasis = [f64; 3];
 pub struct Channel {
     /// Name, see [`super::component::targets`].
     pub name: String,
+    /// What it comes back to the same after, in its unit, if it is an angle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub period: Option<f64>,
     /// Terms of the prediction.
     pub terms: Vec<Term>,
     /// Weight of each term.

@@ -56,6 +56,8 @@ pub struct Target {
     pub period: Option<f64>,
 }
 
+/// Words that no fault may be called by.
+const RESERVED: [&str; 4] = ["ND", "UNKNOWN", "MULTIPLE", "BLIND"];
 /// Name of the component of a pose.
 const POSE: &str = "pose";
 
@@ -161,21 +163,33 @@ pub fn unfit(robot: &Description) -> Option<String> {
 /// Why a declared fault cannot be watched; none if it can.
 fn unfit_fault(fault: &DeclaredFault, all: &[Target], components: &[Component]) -> Option<String> {
     let name = &fault.name;
-    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if name.is_empty() || !name.chars().all(is_name) || name == "ND" {
+    let is_letter = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    let is_word = |word: &String| !word.is_empty() && word.chars().all(is_letter);
+    let words = std::iter::once(name).chain(&fault.group);
+    if let Some(word) = words.clone().find(|word| !is_word(word)) {
         return Some(format!(
-            "fault '{name}': a name has letters, digits, _ and -, and is not ND"
+            "fault '{name}': '{word}' is no name, which has letters, digits, _ and -"
         ));
     }
-    if components
-        .iter()
-        .filter(|other| other.name == *name)
-        .count()
-        > 1
-    {
+    if let Some(word) = words.clone().find(|word| RESERVED.contains(&word.as_str())) {
+        return Some(format!("fault '{name}': '{word}' is a word of Vigil's own"));
+    }
+    let count = |word: &String| {
+        components
+            .iter()
+            .filter(|other| other.name == *word)
+            .count()
+    };
+    let nodes = components.iter().filter_map(|other| other.group.as_ref());
+    let is_node = nodes.clone().any(|group| group == name);
+    if count(name) > 1 || is_node || fault.group.as_ref().is_some_and(|group| count(group) > 0) {
         return Some(format!(
-            "a fault cannot be called '{name}': the name is taken"
+            "fault '{name}': its name, or that of its group, is taken"
         ));
+    }
+    let mut shows = fault.shows.iter().enumerate();
+    if let Some((_, twice)) = shows.find(|(i, channel)| fault.shows[..*i].contains(channel)) {
+        return Some(format!("fault '{name}' shows in '{twice}' twice"));
     }
     if fault.shows.len() > SHOWN_MAX {
         let found = fault.shows.len();
@@ -282,6 +296,31 @@ pub struct Component {
     pub fault: String,
     /// Abstract node above it: its wheel's, that of all further sensors, or the one declared.
     pub group: Option<String>,
+}
+
+/// Where among the components of a robot its drives and its declared faults begin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Places {
+    /// Place of the first drive.
+    pub drives: usize,
+    /// Place of the first declared fault, after the last drive.
+    pub declared: usize,
+    /// Components.
+    pub all: usize,
+}
+
+impl Places {
+    /// Those of a robot's [`components`].
+    #[must_use]
+    pub fn new(robot: &Description) -> Self {
+        let all = components(robot).len();
+        let declared = all - robot.fault.len().min(DECLARED_MAX);
+        Self {
+            drives: declared - drives(robot).len(),
+            declared,
+            all,
+        }
+    }
 }
 
 /// The components of a robot: its sensors in the order of [`targets`], those of the pose as one,

@@ -40,6 +40,7 @@ pub mod coverage;
 pub mod declared_faults;
 pub mod directions;
 pub mod fault_kind;
+mod identity;
 pub mod law;
 pub mod model;
 pub mod monitor;
@@ -51,7 +52,7 @@ pub mod tree;
 pub mod window;
 
 pub use channel::{Channel, Regressor, Scales, Term};
-pub use component::{Component, Quantity, Target, components, drives, targets};
+pub use component::{Component, Places, Quantity, Target, components, drives, targets};
 pub use coverage::{Combinations, Range};
 pub use model::Model;
 pub use monitor::Monitor;

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::channel::{Channel, Regressor, Term};
-use super::component::targets;
 use super::coverage::{Combinations, Range, widening};
 use super::fault_kind::FaultKind;
+use super::identity::{Identity, without_groups};
 use super::law::{Direction, Law};
 use super::observation::{DEPTH, History, SMOOTHING_S};
 use super::scatter::{Scatter, ScatterLaw};
@@ -13,6 +13,7 @@ use super::signature::Signatures;
 use super::{AXES, CHANNELS_MAX, DRIVES_MAX};
 use crate::alarm::AlarmError;
 use crate::description::{Description, INTERVAL_MAX_S, INTERVAL_MIN_S};
+use crate::fault_table::DeclaredFault;
 use crate::learned::channels::Channels;
 use crate::learned::model::{EDITED, ModelError, Provenance, check_calibration};
 use crate::learned::{Calibration, Form};
@@ -136,6 +137,9 @@ pub struct Model {
     pub robot: String,
     /// Interval over which frames are averaged into one observation, s.
     pub interval_s: f64,
+    /// First seconds of a run that are left out, s.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub warm_up_s: f64,
     /// Time in motion that was learned from, s.
     pub exposure_s: f64,
     /// Time at rest that was learned from, s.
@@ -154,7 +158,10 @@ pub struct Model {
     pub direction: Vec<Direction>,
     /// The law of their roughness.
     pub scatter: Scatter,
-    /// How declared faults show.
+    /// Faults that the robot declares.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub declared: Vec<DeclaredFault>,
+    /// How they showed in labelled runs.
     #[serde(default, skip_serializing_if = "Signatures::is_empty")]
     pub signatures: Signatures,
     /// Tails of the classes of faults.
@@ -199,42 +206,30 @@ impl Model {
         self.hash == EDITED
     }
 
-    /// Checks that the model is of this robot: by its name, the axes of its command, its channels
-    /// and its interval.
+    /// Checks that the model is of this robot: by its name, the axes of its command, its channels,
+    /// its interval and warm-up, and how its declared faults show.
     ///
     /// # Errors
     /// [`ModelError::Robot`].
     pub fn check_robot(&self, robot: &Description) -> Result<(), ModelError> {
-        let all = targets(robot);
-        let shown = |axes: Vec<&str>, channels: Vec<&str>, interval_s: f64| {
-            let (axes, channels) = (axes.join(" "), channels.join(" "));
-            format!("command {axes}; channels {channels}; {interval_s} s")
+        let channels = self.channel.iter();
+        let of_model = Identity {
+            name: self.robot.clone(),
+            axes: self.command.iter().map(|axis| axis.name.clone()).collect(),
+            channels: channels.map(|one| (one.name.clone(), one.period)).collect(),
+            interval_s: self.interval_s,
+            warm_up_s: self.warm_up_s,
+            faults: without_groups(&self.declared),
         };
-        let of_model = shown(
-            self.command.iter().map(|axis| axis.name.as_str()).collect(),
-            self.channel
-                .iter()
-                .map(|channel| channel.name.as_str())
-                .collect(),
-            self.interval_s,
-        );
-        let of_robot = shown(
-            robot
-                .command
-                .iter()
-                .map(|axis| axis.name.as_str())
-                .collect(),
-            all.iter().map(|target| target.name.as_str()).collect(),
-            robot.interval_s,
-        );
-        if self.robot == robot.name && of_model == of_robot {
+        let of_robot = Identity::of_robot(robot);
+        if of_model == of_robot {
             return Ok(());
         }
         Err(ModelError::Robot {
             model: self.robot.clone(),
-            model_wheels: of_model,
+            model_wheels: of_model.to_string(),
             robot: robot.name.clone(),
-            robot_wheels: of_robot,
+            robot_wheels: of_robot.to_string(),
         })
     }
 
@@ -352,12 +347,25 @@ impl ModelFile for Model {
         check_scatter(&self.scatter, count)?;
         if !self.signatures.fits(count) {
             let found = format!("{} faults", self.signatures.fault.len());
-            let allowed = "at most 8 faults of 1 to 8 phases, each with three numbers a channel";
+            let allowed = "at most 8 faults of 1 to 8 phases, each with three numbers up to 1e9 \
+                           for each channel, and deviations from 1e-3";
             return refuse("signatures", found, allowed);
+        }
+        for (i, one) in self.signatures.fault.iter().enumerate() {
+            let is_declared = self.declared.iter().any(|fault| fault.name == one.fault);
+            let mut before = self.signatures.fault[..i].iter();
+            if !is_declared || before.any(|other| other.fault == one.fault) {
+                let key = format!("signatures.fault.{i}.fault");
+                return refuse(key, &one.fault, "each declared fault once");
+            }
         }
         self.tail.iter().try_for_each(check_tail)?;
         self.calibration.iter().try_for_each(check_calibration)
     }
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// Checks the numbers of a channel; `axes`: how many there are.

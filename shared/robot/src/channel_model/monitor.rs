@@ -13,7 +13,7 @@ use vigil_inference::logspace::{log_add, log_sum_exp};
 
 use super::bank::{Bank, ChannelPlace, DrivePlace, IMPOSSIBLE, KINDS_MAX, Laws, Weighed};
 use super::channel::{Channel, Scales, commands, lags};
-use super::component::{Quantity, Target, components, drives, targets};
+use super::component::{Places, Quantity, Target, components, drives, targets};
 use super::coverage::{Combinations, Range, widening};
 use super::declared_faults::DeclaredFaults;
 use super::directions::{covariances, directions};
@@ -148,46 +148,26 @@ impl Monitor {
             .map(|&place| Some((place, model.channel.get(place)?.clone())));
         let used = used.collect::<Option<Vec<_>>>()?;
         let sensed = sensed(robot, &used)?;
-        let count = components(robot).len();
-        let first_declared = count - robot.fault.len().min(DECLARED_MAX);
-        let first_drive = first_declared - scales.drives.len();
+        let at = Places::new(robot);
         let driven = scales
             .drives
             .iter()
             .enumerate()
             .map(|(i, drive)| DrivePlace {
-                component: first_drive + i,
+                component: at.drives + i,
                 wheel: drive.wheel,
             });
         let driven = driven.collect();
         let laws = laws(model, &places)?;
         let targets: Vec<Target> = sensed.iter().map(|one| one.target.clone()).collect();
-        let has_all = places.len() == all.len();
-        let signatures = has_all.then_some(&model.signatures);
+        let signatures = (places.len() == all.len()).then_some(&model.signatures);
         let declared = DeclaredFaults::new(robot, &targets, &laws.mean, signatures);
-        let watched = (0..count).map(|i| {
-            let sensor = sensed.iter().find(|sensed| sensed.component == i);
-            let part = match sensor {
-                Some(sensed) => Part::Sensor(sensed.target.quantity),
-                None if i >= first_declared => Part::Robot,
-                None => Part::Drive,
-            };
-            let is_seen = match part {
-                Part::Sensor(_) => true,
-                Part::Drive => i >= first_drive,
-                Part::Robot => declared.is_seen(i - first_declared),
-            };
-            Watch {
-                is_seen,
-                part,
-                slot: sensor.map_or(Slot::ANY, |sensed| slot(&sensed.target)),
-            }
-        });
+        let watched = watched(at, &sensed, &declared);
         let tail = |class: Class| model.tail(channels, class).cloned();
         let window = Window::new(used, scales, model.interval_s);
         let mut monitor = Self {
-            watched: watched.collect(),
-            bank: Bank::new(window, laws, sensed, driven, (declared, first_declared)),
+            watched,
+            bank: Bank::new(window, laws, sensed, driven, (declared, at.declared)),
             ranges: model.command.clone(),
             combinations: model.combinations.clone(),
             lags: lags(model.interval_s),
@@ -346,8 +326,17 @@ impl Monitor {
         let n = self.watched.len();
         let first = n - self.bank.declared().len();
         let classes = [Class::Shift as usize, Class::Signature as usize];
-        let slopes = classes.map(|class| self.tails[class].as_ref().map_or(1.0, |tail| tail.slope));
-        let slope = 0.5 * (slopes[0] + slopes[1]);
+        let tails = classes
+            .iter()
+            .filter_map(|&class| self.tails[class].as_ref());
+        let slopes = tails.fold((0.0, 0.0), |(sum, count), tail| {
+            (sum + tail.slope, count + 1.0)
+        });
+        let slope = if slopes.1 > 0.0 {
+            slopes.0 / slopes.1
+        } else {
+            1.0
+        };
         let total = log_sum_exp(&odds[first..n]);
         let mut shares = [IMPOSSIBLE; DECLARED_MAX];
         for (share, raw) in shares.iter_mut().zip(&raw[first..n]) {
@@ -394,6 +383,29 @@ impl Monitor {
 pub fn component_prior(components: usize) -> f64 {
     let shares = 1.0 + components as f64;
     (FAULT_RATE_1_H / 3600.0 * BLOCK_S * BLOCKS as f64 / shares).ln()
+}
+
+/// The components, by what shows them.
+fn watched(at: Places, sensed: &[ChannelPlace], declared: &DeclaredFaults) -> Vec<Watch> {
+    let watch = |i: usize| {
+        let sensor = sensed.iter().find(|sensed| sensed.component == i);
+        let part = match sensor {
+            Some(sensed) => Part::Sensor(sensed.target.quantity),
+            None if i >= at.declared => Part::Robot,
+            None => Part::Drive,
+        };
+        let is_seen = match part {
+            Part::Sensor(_) => true,
+            Part::Drive => i >= at.drives,
+            Part::Robot => declared.is_seen(i - at.declared),
+        };
+        Watch {
+            is_seen,
+            part,
+            slot: sensor.map_or(Slot::ANY, |sensed| slot(&sensed.target)),
+        }
+    };
+    (0..at.all).map(watch).collect()
 }
 
 /// The channels at these places of a description, with their components.

@@ -1,7 +1,7 @@
 //! A change of several channels at once, each by an amount of its own.
 //!
-//! With `s_i` the shift of channel `i` by one unit, `P` the precision of the law and `z` the window,
-//! the amounts `x ~ N(0, D)` lessen the square of the window by `bᵀM⁻¹b`, at a price of
+//! With `s_i` the shift of channel `i` by one unit, `P` the precision of the law and `z` the
+//! window, the amounts `x ~ N(0, D)` lessen the square of the window by `bᵀM⁻¹b`, at a price of
 //! `½ ln det(DM)`, where `b_i = s_iᵀPz`, `a_ij = s_iᵀPs_j` and `M = A + D⁻¹`: the marginal
 //! likelihood of a linear model with Gaussian amounts.
 

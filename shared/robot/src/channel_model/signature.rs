@@ -2,10 +2,10 @@
 //!
 //! The whitened residuals of each channel are averaged over the last 0.5, 2 and 4 s. A fault that
 //! has begun moves these means in a way that changes with its age, so a signature has a few phases.
-//! The evidence of a phase is linear in the means `v`, `w·v - c`, with `w = C⁻¹μ` and `c = ½ μᵀC⁻¹μ`
-//! for its mean `μ` and a covariance `C` (Fisher's discriminant): the log-likelihood ratio of two
-//! Gaussian laws with one covariance. Successive ratios are of the same residuals, so they are
-//! averaged over time and never summed.
+//! The evidence of a phase is linear in the means `v`, `w·v - c`, with `w = C⁻¹μ` and
+//! `c = ½ μᵀC⁻¹μ` for its mean `μ` and a covariance `C` (Fisher's discriminant): the log-likelihood
+//! ratio of two Gaussian laws with one covariance. Successive ratios are of the same residuals, so
+//! they are averaged over time and never summed.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +22,9 @@ pub const MEANS_MAX: usize = SPANS.len() * CHANNELS_MAX;
 pub const PHASES_MAX: usize = 8;
 /// Deviations beyond which a mean says no more.
 const CLIP: f64 = 12.0;
+/// Smallest deviation of a mean, and the largest magnitude of any number of a signature.
+pub const SD_MIN: f64 = 1e-3;
+const NUMBER_MAX: f64 = 1e9;
 /// A single ratio says no more than this, nats.
 const LOG_RATIO_MAX: f64 = 40.0;
 /// Time constant over which ratios are averaged, s.
@@ -89,7 +92,11 @@ impl Signatures {
     #[must_use]
     pub fn fits(&self, channels: usize) -> bool {
         let n = SPANS.len() * channels;
-        let is_phase = |phase: &Phase| phase.weights.len() == n && phase.offset.is_finite();
+        let is_sane = |value: &f64| value.abs() <= NUMBER_MAX;
+        let is_phase = |phase: &Phase| {
+            let numbers = phase.weights.iter().chain([&phase.offset]);
+            phase.weights.len() == n && numbers.into_iter().all(is_sane)
+        };
         let is_whole = |one: &Signature| {
             let phases = one.phase.len();
             (1..=PHASES_MAX).contains(&phases) && one.phase.iter().all(is_phase)
@@ -97,7 +104,8 @@ impl Signatures {
         self.is_empty()
             || (self.mean.len() == n
                 && self.sd.len() == n
-                && self.sd.iter().all(|sd| *sd > 0.0)
+                && self.mean.iter().all(is_sane)
+                && self.sd.iter().all(|sd| (SD_MIN..=NUMBER_MAX).contains(sd))
                 && self.fault.len() <= DECLARED_MAX
                 && self.fault.iter().all(is_whole))
     }
@@ -221,5 +229,13 @@ mod tests {
         assert!(!of(6, 1.0, 4).fits(3) && !of(5, 1.0, 4).fits(2));
         assert!(!of(6, 0.0, 4).fits(2) && !of(6, f64::NAN, 4).fits(2));
         assert!(!of(6, 1.0, 0).fits(2) && !of(6, 1.0, 9).fits(2));
+        for wrong in [f64::NAN, f64::INFINITY, -1e10] {
+            let mut signatures = of(6, 1.0, 1);
+            signatures.fault[0].phase[0].weights[3] = wrong;
+            assert!(!signatures.fits(2));
+            let mut signatures = of(6, 1.0, 1);
+            signatures.mean[0] = wrong;
+            assert!(!signatures.fits(2));
+        }
     }
 }

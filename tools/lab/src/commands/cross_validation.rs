@@ -1,5 +1,5 @@
-//! `vigil learn --cross-validate`: each group of runs diagnosed by a model that was learned from the
-//! others.
+//! `vigil learn --cross-validate`: each group of runs diagnosed by a model that was learned from
+//! the others.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -16,7 +16,7 @@ use vigil_robot::channel_model::tree::tree;
 use vigil_terminal::CommandError;
 use vigil_terminal::output::Progress;
 
-use super::learn_channels::{self, Task};
+use super::learn_task::{Task, learn};
 
 /// What stays the same over the groups.
 struct CrossValidation<'a> {
@@ -37,11 +37,7 @@ struct Fold {
 ///
 /// # Errors
 /// Groups that are too few, or without which there is nothing to learn from.
-pub(super) fn score(
-    task: &Task<'_>,
-    labels: &[Label],
-    false_alarm_interval_h: f64,
-) -> Result<Score, CommandError> {
+pub(super) fn score(task: &Task<'_>, labels: &[Label]) -> Result<Score, CommandError> {
     let ids: Vec<u32> = task.runs.iter().map(|run| run.id).collect();
     let used = labels.iter().filter(|label| ids.contains(&label.run));
     let groups: BTreeSet<&str> = used.map(|label| label.group.as_str()).collect();
@@ -61,7 +57,7 @@ pub(super) fn score(
         },
         tree,
         settings: detect::Settings {
-            false_alarm_interval_h,
+            false_alarm_interval_h: task.false_alarm_interval_h,
             ..detect::Settings::default()
         },
     };
@@ -69,7 +65,16 @@ pub(super) fn score(
     let folds = validation.folds(&groups)?;
     let threshold = folds.iter().map(|fold| fold.alarm_log_odds);
     let alarm_log_odds = threshold.fold(f64::NEG_INFINITY, f64::max);
-    let cases: Vec<Case> = folds.into_iter().flat_map(|fold| fold.cases).collect();
+    // Each model has its own threshold: told from that, all are alike.
+    let cases = folds.into_iter().flat_map(|fold| {
+        let apart = alarm_log_odds - fold.alarm_log_odds;
+        let mut cases = fold.cases;
+        for verdict in cases.iter_mut().flat_map(|case| &mut case.verdicts) {
+            verdict.log_odds += apart;
+        }
+        cases
+    });
+    let cases: Vec<Case> = cases.collect();
     let taxonomy = &validation.vocabulary.taxonomy;
     Ok(scoring::score(&cases, taxonomy, alarm_log_odds))
 }
@@ -96,10 +101,11 @@ impl CrossValidation<'_> {
             .filter(of_group)
             .map(|run| run.id)
             .collect();
-        let (model, _) = learn_channels::learn(task, &left_out)?;
         let refuse = |error: &dyn std::fmt::Display| {
             CommandError::usage(format!("without the group '{group}': {error}"))
         };
+        let learned = learn(task, &left_out, None);
+        let (model, _) = learned.map_err(|error| refuse(&error))?;
         let settings = &self.settings;
         let detector = Detector::of_channels(&model, task.robot, settings);
         let detector = detector.map_err(|error| refuse(&error))?;

@@ -10,7 +10,8 @@ use vigil_terminal::CommandError;
 /// The runs that are labelled with a fault.
 ///
 /// # Errors
-/// A run without a label, or with that of a fault that `robot` does not declare.
+/// A run without a label, or with that of a fault that `robot` does not declare, or that begins
+/// after the run.
 pub(super) fn labelled_runs<'a>(
     runs: &'a [Run],
     labels: &'a [Label],
@@ -42,6 +43,11 @@ pub(super) fn labelled_runs<'a>(
             );
             return Err(CommandError::usage(message));
         }
+        let end_s = run.frames.last().map_or(0.0, time_s);
+        if onset_s > end_s {
+            let message = format!("run {id} ends at {end_s:.2} s, before its onset at {onset_s} s");
+            return Err(CommandError::usage(message));
+        }
         found.push(LabelledRun {
             run,
             fault: &label.mode,
@@ -56,9 +62,14 @@ pub(super) fn labelled_runs<'a>(
 pub(super) fn healthy_part(run: &Run, faulty: &[LabelledRun<'_>]) -> Run {
     let label = faulty.iter().find(|label| label.run.id == run.id);
     let until_s = label.map_or(f64::INFINITY, |label| label.onset_s);
-    let is_before = |frame: &&SensorFrame| (frame.header.t_capture_ns as f64) * 1e-9 < until_s;
+    let is_before = |frame: &&SensorFrame| time_s(frame) < until_s;
     Run {
         id: run.id,
         frames: run.frames.iter().take_while(is_before).copied().collect(),
     }
+}
+
+/// Time of a frame since the recording began, s.
+fn time_s(frame: &SensorFrame) -> f64 {
+    frame.header.t_capture_ns as f64 * 1e-9
 }

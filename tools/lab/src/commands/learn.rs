@@ -17,10 +17,11 @@ use vigil_robot::learned::model::Provenance;
 use vigil_robot::{Description, RobotModel};
 
 use super::files::{check_place, file_name, write_whole};
-use super::offline::{RobotArgs, load_model};
+use super::offline::{RobotArgs, hours, load_model};
 use vigil_terminal::{CommandError, Outcome};
 
 use super::learn_channels;
+use super::learn_task::Task;
 use vigil_terminal::output;
 
 /// Largest part of the runs that may be left out.
@@ -73,11 +74,11 @@ pub struct Args {
     /// of channels.
     #[arg(long, requires = "runs")]
     cross_validate: bool,
-    /// Mean time between false alarms, h, to cross-validate with.
+    /// Mean time between false alarms, h, for which a model of channels is judged.
     #[arg(
         long,
         value_name = "H",
-        requires = "cross_validate",
+        value_parser = hours,
         default_value_t = detect::Settings::default().false_alarm_interval_h
     )]
     false_alarm_interval: f64,
@@ -171,6 +172,11 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
         }
         return channels(args, frames_file, out, &robot);
     };
+    if args.cross_validate {
+        let refused = "--cross-validate: this robot has no model of channels; score the runs \
+                       that are left out with `vigil evaluate`";
+        return Err(CommandError::usage(refused));
+    }
     let labels = labels::read(labels_file, &robot).map_err(CommandError::usage)?;
     let runs = frames::read(frames_file, &robot).map_err(CommandError::usage)?;
     warn_slow(&runs, &labels, frames_file, &robot);
@@ -277,7 +283,7 @@ fn channels(
         Some(file) => Some(labels::read(file, robot).map_err(CommandError::usage)?),
         None => None,
     };
-    learn_channels::run(&learn_channels::Task {
+    learn_channels::run(&Task {
         robot,
         runs: &runs,
         frames: frames_file,
@@ -285,9 +291,11 @@ fn channels(
         test_fraction: args.test_fraction,
         seed: args.seed,
         until_s: args.until.unwrap_or(f64::INFINITY),
-        cross_validate: args.cross_validate.then_some(args.false_alarm_interval),
+        false_alarm_interval_h: args.false_alarm_interval,
+        cross_validate: args.cross_validate,
         json: args.json,
         labels: labels.as_deref(),
+        labels_file: args.runs.as_deref(),
     })
 }
 

@@ -1,51 +1,15 @@
 //! `vigil learn` for any described robot: a model of its channels.
 
-use std::collections::BTreeSet;
-use std::path::Path;
-
 use serde::Serialize;
 use vigil_evaluation::scoring::Score;
-use vigil_learning::channel_learning::{self, LabelledRun, Report};
-use vigil_learning::split::split_runs;
-use vigil_recording::frames::Run;
-use vigil_recording::labels::Label;
-use vigil_robot::Description;
-use vigil_robot::channel_model::Model;
+use vigil_learning::channel_learning::Report;
 use vigil_robot::learned::model::Provenance;
 
 use super::cross_validation;
 use super::files::{file_name, write_whole};
-use super::labelled_runs::{healthy_part, labelled_runs};
+use super::learn_task::{Task, held_out, learn};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
-
-/// Runs from which some are left out; below, blocks of them are.
-const RUNS_TO_SPLIT: usize = 6;
-
-/// What to learn from.
-pub(super) struct Task<'a> {
-    /// The robot.
-    pub robot: &'a Description,
-    /// Runs; without labels all count as healthy.
-    pub runs: &'a [Run],
-    /// Labels of the runs.
-    pub labels: Option<&'a [Label]>,
-    /// Frames file, for messages.
-    pub frames: &'a Path,
-    /// Where to write the model.
-    pub out: &'a Path,
-    /// Part of the runs to leave out.
-    pub test_fraction: f64,
-    /// Seed of that choice.
-    pub seed: u64,
-    /// End of what is learned from in each run, s.
-    pub until_s: f64,
-    /// Mean time between false alarms, h, with which to cross-validate; none if that was not asked
-    /// for.
-    pub cross_validate: Option<f64>,
-    /// Print JSON.
-    pub json: bool,
-}
 
 #[derive(Debug, Serialize)]
 struct Document<'a> {
@@ -65,26 +29,24 @@ struct Document<'a> {
 /// A log that cannot support a model; an output that cannot be written.
 pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
     let held_out = held_out(task);
-    let (mut model, report) = learn(task, &held_out)?;
+    let (mut model, report) = learn(task, &held_out, Some(task.false_alarm_interval_h))?;
     model.provenance = Provenance {
         frames_file: file_name(task.frames),
+        labels_file: task.labels_file.map(file_name).unwrap_or_default(),
         seed: task.seed,
         test_fraction: task.test_fraction,
         software_version: env!("CARGO_PKG_VERSION").to_owned(),
         ..model.provenance
     };
     let model = model.sealed();
+    let labels = task.labels.filter(|_| task.cross_validate);
+    let score = labels.map(|labels| cross_validation::score(task, labels));
+    let score = score.transpose()?;
     let text = model.to_toml().map_err(CommandError::failure)?;
     write_whole(task.out, &text)?;
     for warning in &report.warnings {
         eprintln!("warning: {warning}");
     }
-    let score = match (task.cross_validate, task.labels) {
-        (Some(interval_h), Some(labels)) => {
-            Some(cross_validation::score(task, labels, interval_h)?)
-        }
-        _ => None,
-    };
     let printed = if task.json {
         output::json(&Document {
             schema_version: 1,
@@ -105,57 +67,4 @@ pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
     };
     printed.map_err(CommandError::failure)?;
     Ok(Outcome::Done)
-}
-
-/// Runs to leave out of learning: whole groups of labelled ones, each of which hardly differs from
-/// its likes.
-fn held_out(task: &Task<'_>) -> Vec<u32> {
-    let ids = task.runs.iter().map(|run| run.id);
-    let Some(labels) = task.labels else {
-        let ids: Vec<u32> = ids.collect();
-        return match ids.len() < RUNS_TO_SPLIT {
-            true => Vec::new(),
-            false => split_runs(&ids, task.test_fraction, task.seed),
-        };
-    };
-    let group = |id: u32| {
-        labels
-            .iter()
-            .find(|label| label.run == id)
-            .map(|label| &label.group)
-    };
-    let groups: BTreeSet<&String> = ids.clone().filter_map(group).collect();
-    let numbered: Vec<u32> = (0..).take(groups.len()).collect();
-    let left_out = split_runs(&numbered, task.test_fraction, task.seed);
-    let is_left_out = |id: &u32| {
-        let place = group(*id).and_then(|group| groups.iter().position(|other| *other == group));
-        place.is_some_and(|place| left_out.contains(&(place as u32)))
-    };
-    ids.filter(is_left_out).collect()
-}
-
-/// Learns from the runs that are not held out.
-pub(super) fn learn(task: &Task<'_>, held_out: &[u32]) -> Result<(Model, Report), CommandError> {
-    let faulty = match task.labels {
-        Some(labels) => labelled_runs(task.runs, labels, task.robot)?,
-        None => Vec::new(),
-    };
-    let healthy = task.runs.iter().map(|run| healthy_part(run, &faulty));
-    let healthy: Vec<Run> = healthy.collect();
-    let is_learned = |label: &LabelledRun<'_>| !held_out.contains(&label.run.id);
-    let labelled: Vec<LabelledRun<'_>> = faulty.into_iter().filter(is_learned).collect();
-    channel_learning::learn(&healthy, held_out, task.until_s, task.robot, &labelled)
-        .map_err(|error| CommandError::usage(format!("{}: {error}", task.frames.display())))
-}
-
-#[cfg(test)]
-mod tests {
-    use vigil_diagnosis::detect::Settings;
-    use vigil_learning::channel_learning::FALSE_ALARM_INTERVAL_H;
-
-    #[test]
-    fn the_report_is_of_the_detectors_own_interval_between_false_alarms() {
-        let settings = Settings::default();
-        assert_eq!(FALSE_ALARM_INTERVAL_H, settings.false_alarm_interval_h);
-    }
 }

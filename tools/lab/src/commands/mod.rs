@@ -9,6 +9,7 @@ pub mod init;
 mod labelled_runs;
 pub mod learn;
 mod learn_channels;
+mod learn_task;
 mod offline;
 pub mod pomdp;
 pub mod report;

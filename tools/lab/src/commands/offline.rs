@@ -31,6 +31,14 @@ const DECISION: &str = "config/rover.pomdp";
 /// deadlines, so none is ever missed.
 const BLIND_MISSES: u32 = 1;
 
+/// A time, h.
+pub fn hours(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("allowed is a number above 0".to_owned()),
+    }
+}
+
 /// Sets of channels, as `--sensors` names them.
 pub const SENSOR_SETS: [&str; 3] = ["pose", "pose+encoders", "all"];
 
@@ -71,7 +79,12 @@ pub struct FilterArgs {
     #[arg(long, value_name = "FORM", value_enum, default_value_t)]
     detector: Form,
     /// Mean time between false alarms, h.
-    #[arg(long, value_name = "H", default_value_t = detect::Settings::default().false_alarm_interval_h)]
+    #[arg(
+        long,
+        value_name = "H",
+        value_parser = hours,
+        default_value_t = detect::Settings::default().false_alarm_interval_h
+    )]
     false_alarm_interval: f64,
     /// Identification filter.
     #[arg(long, value_name = "NAME", value_enum, default_value_t)]
@@ -270,7 +283,7 @@ impl FilterArgs {
         );
         let (model, frames) = (self.model.display(), self.frames.display());
         let all: Vec<&Run> = of.runs.iter().collect();
-        let data = data_hash(&all, f64::INFINITY);
+        let data = data_hash(&all, f64::INFINITY, &[]);
         vec![
             ("command", words.join(" ")),
             ("version", env!("CARGO_PKG_VERSION").to_owned()),

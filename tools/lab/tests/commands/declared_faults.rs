@@ -62,7 +62,7 @@ fn the_page_can_be_followed_on_an_aircrafts_flights() {
     assert_eq!(names, ["learn", "evaluate", "learn"]);
     let learned = printed(&vigil(folder.path(), &commands[0]));
     assert!(
-        learned.contains("runs found by what the other groups show, recognized"),
+        learned.contains("engine: recognized by its runs"),
         "{learned}"
     );
     printed(&vigil(folder.path(), &commands[1]));
@@ -119,6 +119,8 @@ fn labels_that_name_no_fault_of_the_robot_are_refused() {
     );
     let missing = refused("run,mode,onset_s\n7,ND,-1\n");
     assert!(missing.contains("no label of run 0"), "{missing}");
+    let late = refused("run,mode,onset_s\n0,engine,500\n");
+    assert!(late.contains("run 0 ends at 59.98 s"), "{late}");
     let single = refused("run,mode,onset_s\n0,ND,-1\n");
     assert!(single.contains("two groups"), "{single}");
 }

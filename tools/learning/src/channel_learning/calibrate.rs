@@ -1,6 +1,7 @@
 //! The tails of the log-odds without a fault.
 
 use vigil_robot::Description;
+use vigil_robot::channel_model::bank::IMPOSSIBLE;
 use vigil_robot::channel_model::model::{Class, FAULT_RATE_1_H, Tail};
 use vigil_robot::channel_model::{Model, Monitor};
 use vigil_robot::learned::calibration::SLOPE_UNKNOWN;
@@ -29,7 +30,12 @@ pub(super) fn fit(
     for channels in sets {
         let mut by_class = maxima(models, records, (robot, channels), Monitor::classes);
         let shows = robot.fault.iter().any(|fault| !fault.shows.is_empty());
-        let is_there = |class: &Class| *class != Class::Shift || shows;
+        // Without a command nothing is late, and nothing is driven.
+        let is_there = |class: &Class| match class {
+            Class::Shift => shows,
+            Class::Late | Class::Drive => !robot.command.is_empty(),
+            _ => true,
+        };
         let all = Class::ALL
             .into_iter()
             .filter(|class| *class != Class::Signature);
@@ -38,8 +44,11 @@ pub(super) fn fit(
         if !model.signatures.is_empty() {
             // They are seen as live: what is suspected of the other classes is known.
             let mut by_class = maxima(models, records, (robot, channels), Monitor::classes);
-            let signature = [Class::Signature].into_iter();
-            let tails = self::tails(signature, &mut by_class, (channels, form));
+            let found = &mut by_class[Class::Signature as usize];
+            found.raise(IMPOSSIBLE);
+            // One that health never resembles is known no better than its law.
+            let signature = Some(Class::Signature).filter(|_| found.vary());
+            let tails = self::tails(signature.into_iter(), &mut by_class, (channels, form));
             extend(model, models, &tails);
         }
         let of = |monitor: &Monitor| [monitor.report().log_odds];
@@ -61,16 +70,13 @@ fn extend(model: &mut Model, models: &mut [Model], tails: &[Tail]) {
 }
 
 /// The tails of classes of faults. The same residuals feed all classes but that of noise, and few
-/// moments show their tail: they share the least slope. A class that nothing tells of this robot,
-/// as a delay without a command, has none.
+/// moments show their tail: they share the least slope.
 fn tails(
     classes: impl Iterator<Item = Class>,
     maxima: &mut [Maxima; Class::ALL.len()],
     (channels, form): (Channels, Form),
 ) -> Vec<Tail> {
-    let told = classes.filter(|class| maxima[*class as usize].vary());
-    let told: Vec<Class> = told.collect();
-    let fitted = told.into_iter().map(|class| {
+    let fitted = classes.map(|class| {
         let found = &mut maxima[class as usize];
         let tail = found.high_tail(channels, form, FAULT_RATE_1_H);
         (class, tail, found.highest())

@@ -5,7 +5,8 @@
 //! these are, the nearer to health. A signature is kept if it finds at least half of the fault's
 //! runs without having seen the group that they are of, so one of a single group never is.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -14,7 +15,7 @@ use vigil_robot::Description;
 use vigil_robot::channel_model::channel::commands;
 use vigil_robot::channel_model::law::BLOCKS;
 use vigil_robot::channel_model::signature::{
-    Evidence, MEANS_MAX, Means, Phase, Signature, Signatures, means,
+    Evidence, MEANS_MAX, Means, Phase, SD_MIN, Signature, Signatures, means,
 };
 use vigil_robot::channel_model::window::Window;
 use vigil_robot::channel_model::{Model, Scales};
@@ -36,8 +37,6 @@ const INDEPENDENT: f64 = 0.1;
 const FOUND: f64 = 5.0;
 const FOUND_RATIO: f64 = 1.2;
 const FOUND_S: f64 = 10.0;
-/// Smallest deviation of a mean.
-const SD_MIN: f64 = 1e-3;
 
 /// A run with a declared fault.
 #[derive(Debug, Clone)]
@@ -67,10 +66,48 @@ pub struct FaultFit {
     pub fault: String,
     /// Its runs.
     pub runs: usize,
-    /// Runs that are found by what those of the other groups showed.
+    /// Those that show some healthy seconds, and then how the fault begins.
+    pub runs_with_onset: usize,
+    /// Groups of these.
+    pub groups: usize,
+    /// Runs that are found by a signature that has not seen their group.
     pub runs_found: usize,
     /// True if the model recognizes the fault by its runs.
     pub is_used: bool,
+}
+
+impl fmt::Display for FaultFit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (fault, runs) = (&self.fault, self.runs);
+        if self.runs_with_onset < runs {
+            let without = runs - self.runs_with_onset;
+            write!(
+                f,
+                "{fault}: {without} of {runs} runs show no healthy seconds before it; "
+            )?;
+        }
+        let found = (self.runs_found, self.runs_with_onset);
+        match (self.groups, self.is_used) {
+            (0, _) => write!(f, "{fault}: no run shows how it begins"),
+            (1, _) => write!(
+                f,
+                "{fault}: not recognized by its runs: all are of one group"
+            ),
+            (_, is_used) => {
+                let used = if is_used {
+                    "recognized"
+                } else {
+                    "not recognized"
+                };
+                write!(
+                    f,
+                    "{fault}: {used} by its runs: {} of {} found by a signature that has not seen \
+                     their group",
+                    found.0, found.1
+                )
+            }
+        }
+    }
 }
 
 /// Fits the signatures of `model`, whose joint law is fitted.
@@ -105,15 +142,21 @@ pub(super) fn fit(
     for fault in &robot.fault {
         let of_fault = samples.iter().filter(|one| one.label.fault == fault.name);
         let runs: Vec<&Sample<'_>> = of_fault.collect();
-        if runs.is_empty() {
+        let labels = labelled.iter().filter(|label| label.fault == fault.name);
+        let labels = labels.count();
+        if labels == 0 {
             continue;
         }
+        let groups: BTreeSet<&str> = runs.iter().map(|run| run.label.group).collect();
         let runs_found = found(&health, &fault.name, &runs);
         let signature = health.signature(&fault.name, &runs);
-        let signature = signature.filter(|_| 2 * runs_found >= runs.len());
+        let is_enough = groups.len() > 1 && 2 * runs_found >= runs.len();
+        let signature = signature.filter(|_| is_enough);
         told.push(FaultFit {
             fault: fault.name.clone(),
-            runs: runs.len(),
+            runs: labels,
+            runs_with_onset: runs.len(),
+            groups: groups.len(),
             runs_found,
             is_used: signature.is_some(),
         });
@@ -197,7 +240,8 @@ fn vector(means: &Means, n: usize) -> DVector<f64> {
     DVector::from_column_slice(&means[..n])
 }
 
-/// The labelled runs through the model of health.
+/// The labelled runs through the model of health: those that show it for a whole window, and then
+/// the fault.
 fn samples<'a>(
     model: &Model,
     labelled: &'a [LabelledRun<'a>],
@@ -213,6 +257,7 @@ fn samples<'a>(
             means: Vec::new(),
         };
         window.reset();
+        let mut is_healthy_first = false;
         let until_s = label.onset_s + FOUND_S;
         for record in record::all(&[label.run], until_s, robot) {
             for history in &record.histories {
@@ -223,16 +268,18 @@ fn samples<'a>(
                 }
                 window.push(history, &commands(history), (model.widening(history), 0));
                 let age_s = now.t_ns as f64 * 1e-9 - label.onset_s;
-                if age_s >= 0.0 && window.whole_blocks() == BLOCKS {
+                let is_whole = window.whole_blocks() == BLOCKS;
+                is_healthy_first |= age_s < 0.0 && is_whole;
+                if age_s >= 0.0 && is_whole && is_healthy_first {
                     out.ages.push([age_s, now.dt_s]);
                     let found = means(&window, n);
                     out.means.push(model.signatures.standardized(&found));
                 }
             }
         }
-        out
+        (!out.ages.is_empty()).then_some(out)
     };
-    labelled.iter().map(&mut sample).collect()
+    labelled.iter().filter_map(&mut sample).collect()
 }
 
 impl Health {

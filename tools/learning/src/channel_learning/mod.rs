@@ -33,7 +33,7 @@ use vigil_robot::learned::model::Provenance;
 
 use crate::data_hash::data_hash;
 use crate::plausibility::{self, RunCheck, RunDoubt};
-pub use isolability::{FALSE_ALARM_INTERVAL_H, Isolability};
+pub use isolability::Isolability;
 pub use labelled::{FaultFit, LabelledRun};
 use record::{FOLDS, Record};
 pub use report::{ChannelFit, Report};
@@ -120,37 +120,59 @@ pub enum LogError {
     },
 }
 
-/// Learns a model from the runs that are not in `held_out`, up to `until_s` of each; from runs of
-/// declared faults how these show.
+/// What to learn from.
+#[derive(Debug, Clone, Copy)]
+pub struct Log<'a> {
+    /// Runs without a fault, and what comes before it of those with one.
+    pub healthy: &'a [Run],
+    /// Runs of declared faults.
+    pub labelled: &'a [LabelledRun<'a>],
+    /// Names of groups by the ids of runs: those of one group are never judged by each other. A run
+    /// without one is a group of its own.
+    pub groups: &'a [(u32, String)],
+    /// Ids of the runs to leave out.
+    pub held_out: &'a [u32],
+    /// End of what is learned from in each run, s.
+    pub until_s: f64,
+    /// Mean time between false alarms, h, for which [`Report::isolability`] is found; none: it is
+    /// not.
+    pub isolability_at_h: Option<f64>,
+}
+
+impl<'a> Log<'a> {
+    /// All of these runs, none of which has a fault.
+    #[must_use]
+    pub const fn of_healthy(runs: &'a [Run]) -> Self {
+        Self {
+            healthy: runs,
+            labelled: &[],
+            groups: &[],
+            held_out: &[],
+            until_s: f64::INFINITY,
+            isolability_at_h: None,
+        }
+    }
+}
+
+/// Learns a model of a robot.
 ///
 /// # Errors
 /// [`LogError`] naming what is missing.
-pub fn learn(
-    runs: &[Run],
-    held_out: &[u32],
-    until_s: f64,
-    robot: &Description,
-    labelled: &[LabelledRun<'_>],
-) -> Result<(Model, Report), LogError> {
-    let (left_out, learned): (Vec<&Run>, Vec<&Run>) =
-        runs.iter().partition(|run| held_out.contains(&run.id));
+pub fn learn(log: &Log<'_>, robot: &Description) -> Result<(Model, Report), LogError> {
+    let until_s = log.until_s;
+    let is_left_out = |run: &&Run| log.held_out.contains(&run.id);
+    let (left_out, learned): (Vec<&Run>, Vec<&Run>) = log.healthy.iter().partition(is_left_out);
     if learned.is_empty() {
         return Err(LogError::NoRuns);
     }
     let doubt = doubt(&learned, until_s, robot)?;
-    let records = record::all(&learned, until_s, robot);
+    let records = record::grouped(&learned, log.groups, until_s, robot);
     let command = excitation::ranges(&records, robot)?;
     let exposure_s = records.iter().map(Record::moving_s).sum();
-    let provenance = Provenance {
-        data_hash: data_hash(&learned, until_s),
-        runs_learned: learned.iter().map(|run| run.id).collect(),
-        runs_held_out: left_out.iter().map(|run| run.id).collect(),
-        until_s: until_s.is_finite().then_some(until_s),
-        ..Provenance::default()
-    };
+    let provenance = provenance(log, &learned, &left_out);
     let mut model = blank(robot, exposure_s, command, provenance);
     model.rest_s = record::rest_s(&records, lags(robot.interval_s));
-    let mut report = Report::new(&model, runs.len() - left_out.len(), left_out.len());
+    let mut report = Report::new(&model, learned.len(), left_out.len());
     report.warnings.extend(doubt);
     let beginnings = learned.iter().map(|run| (*run, until_s));
     report
@@ -163,19 +185,14 @@ pub fn learn(
     let untold = untold(&records, &model, robot)?;
     report.untold(&untold, &model);
     let scales = Scales::new(model.sizes(), drives(robot), robot.interval_s);
-    let products = coverage::products(&terms::command(robot), &untold);
-    let ranges = model.command.clone();
-    let combinations = |part| coverage::combinations(&records, part, &products, &ranges);
-    model.combinations = combinations(None);
-    let mut models = excitation::of_parts(&records, &model);
-    for (part, seen) in models.iter_mut().enumerate() {
-        seen.combinations = combinations(Some(part));
-    }
+    let mut models = cover(&mut model, &records, robot, &untold);
     for (place, target) in all.iter().enumerate() {
         let mut terms = terms::candidates(target, robot);
         let told = |set: &mut Vec<Term>| set.retain(|term| !untold.contains(term));
         terms.iter_mut().for_each(told);
         let (channel, of_parts) = fit(target, place, &terms, &records, (&models, &scales))?;
+        let astray = |period| record::part_astray(&records, place, period);
+        report.astray(&channel.name, target.period.map_or(0.0, astray));
         report.add(&channel, &target.unit);
         model.channel.push(channel);
         for (part, channel) in models.iter_mut().zip(of_parts) {
@@ -183,21 +200,65 @@ pub fn learn(
         }
     }
     joint::fit(&mut model, &mut models, &records, &scales);
-    report.faults = labelled::fit(&mut model, (&models, &records), labelled, (robot, &scales));
+    report.faults = labelled::fit(
+        &mut model,
+        (&models, &records),
+        log.labelled,
+        (robot, &scales),
+    );
     for part in &mut models {
         part.signatures.clone_from(&model.signatures);
     }
     calibrate::fit(&mut model, &mut models, &records, robot);
     calibrate::tell(&mut report.bounds, &model);
-    report.isolability = isolability::report(&isolability::Task {
-        model: &model,
-        models: &models,
-        records: &records,
-        scales: &scales,
-        robot,
-    });
+    let study = |interval_h| {
+        isolability::report(&isolability::Task {
+            model: &model,
+            models: &models,
+            records: &records,
+            scales: &scales,
+            robot,
+            interval_h,
+        })
+    };
+    report.isolability = log.isolability_at_h.and_then(study);
     report.finish(&model);
     Ok((model.sealed(), report))
+}
+
+/// Learns which commands the log covers; with models of the parts' others.
+fn cover(
+    model: &mut Model,
+    records: &[Record],
+    robot: &Description,
+    untold: &[Term],
+) -> Vec<Model> {
+    let products = coverage::products(&terms::command(robot), untold);
+    let ranges = model.command.clone();
+    let combinations = |part| coverage::combinations(records, part, &products, &ranges);
+    model.combinations = combinations(None);
+    let mut models = excitation::of_parts(records, model);
+    for (part, seen) in models.iter_mut().enumerate() {
+        seen.combinations = combinations(Some(part));
+    }
+    models
+}
+
+fn provenance(log: &Log<'_>, learned: &[&Run], left_out: &[&Run]) -> Provenance {
+    let labels = log.labelled.iter().map(|label| {
+        let LabelledRun { run, onset_s, .. } = label;
+        format!("{} {} {onset_s}", run.id, label.fault)
+    });
+    let labels: Vec<String> = labels.collect();
+    let runs = log.labelled.iter().map(|label| label.run);
+    let runs: Vec<&Run> = learned.iter().copied().chain(runs).collect();
+    Provenance {
+        data_hash: data_hash(&runs, log.until_s, &labels),
+        runs_learned: learned.iter().map(|run| run.id).collect(),
+        runs_held_out: left_out.iter().map(|run| run.id).collect(),
+        until_s: log.until_s.is_finite().then_some(log.until_s),
+        ..Provenance::default()
+    }
 }
 
 /// A model of which nothing but the command is known.
@@ -213,6 +274,7 @@ fn blank(
         hash: String::new(),
         robot: robot.name.clone(),
         interval_s: robot.interval_s,
+        warm_up_s: robot.warm_up_s,
         exposure_s,
         rest_s: 0.0,
         widened: widening(exposure_s, robot.interval_s),
@@ -222,6 +284,7 @@ fn blank(
         channel: Vec::new(),
         direction: Vec::new(),
         scatter: Scatter::default(),
+        declared: robot.fault.clone(),
         signatures: Signatures::default(),
         tail: Vec::new(),
         calibration: Vec::new(),
@@ -300,6 +363,7 @@ fn weights(
 ) -> Result<(Channel, Vec<Channel>), LogError> {
     let mut channel = Channel {
         name: target.name.clone(),
+        period: target.period,
         terms: terms.to_vec(),
         weights: vec![0.0; terms.len()],
         variance: [0.0; 3],

@@ -43,6 +43,17 @@ pub(super) fn silence_s(records: &[Record], place: usize) -> f64 {
     longest_s
 }
 
+/// Part of a channel's readings beyond a quarter of its period.
+pub(super) fn part_astray(records: &[Record], place: usize, period: f64) -> f64 {
+    let newest = records.iter().flat_map(|record| &record.histories);
+    let values = newest.filter_map(|history| history.ago(0)?.values[place]);
+    let (astray, all) = values.fold((0.0, 0.0), |(astray, all), value| {
+        let is_astray = value.abs() > 0.25 * period;
+        (astray + f64::from(u8::from(is_astray)), all + 1.0)
+    });
+    astray / f64::max(all, 1.0)
+}
+
 /// Time at rest after all lags of the motion before, s.
 pub(super) fn rest_s(records: &[Record], lags: usize) -> f64 {
     let all = records.iter().flat_map(|record| &record.histories);
@@ -52,9 +63,36 @@ pub(super) fn rest_s(records: &[Record], lags: usize) -> f64 {
     rests.map(|now| now.dt_s).sum()
 }
 
-/// The runs up to a time, s.
+/// The runs up to a time, s, each a group of its own.
 pub(super) fn all(runs: &[&Run], until_s: f64, robot: &Description) -> Vec<Record> {
-    let record = |(i, run): (usize, &&Run)| {
+    grouped(runs, &[], until_s, robot)
+}
+
+/// The runs up to a time, s. Those of one group are in one part, if there are groups enough.
+pub(super) fn grouped(
+    runs: &[&Run],
+    groups: &[(u32, String)],
+    until_s: f64,
+    robot: &Description,
+) -> Vec<Record> {
+    let name = |run: &Run| {
+        let group = groups.iter().find(|(id, _)| *id == run.id);
+        group.map_or_else(
+            || format!("run {}", run.id),
+            |(_, name)| format!("group {name}"),
+        )
+    };
+    let mut names: Vec<String> = Vec::new();
+    let mut places = Vec::with_capacity(runs.len());
+    for run in runs {
+        let name = name(run);
+        let place = names.iter().position(|other| *other == name);
+        places.push(place.unwrap_or(names.len()));
+        if place.is_none() {
+            names.push(name);
+        }
+    }
+    let record = |(run, i): (&&Run, usize)| {
         let mut observer = Observer::new(robot);
         let mut histories = Vec::new();
         for frame in &run.frames {
@@ -66,7 +104,7 @@ pub(super) fn all(runs: &[&Run], until_s: f64, robot: &Description) -> Vec<Recor
             }
         }
         let length = histories.len().div_ceil(PIECES).max(1);
-        let fold = |k: usize| match runs.len() < FOLDS {
+        let fold = |k: usize| match names.len() < FOLDS {
             true => (i + k / length) % FOLDS,
             false => i % FOLDS,
         };
@@ -75,5 +113,5 @@ pub(super) fn all(runs: &[&Run], until_s: f64, robot: &Description) -> Vec<Recor
             histories,
         }
     };
-    runs.iter().enumerate().map(record).collect()
+    runs.iter().zip(places).map(record).collect()
 }

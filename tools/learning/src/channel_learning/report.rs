@@ -12,6 +12,9 @@ use super::terms::word;
 use crate::bounds::Bounds;
 use crate::learning::RESIDUAL_BAR;
 
+/// Part of an angle's readings beyond a quarter of its period that is told. Chosen.
+const ASTRAY: f64 = 0.05;
+
 /// One channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelFit {
@@ -44,7 +47,8 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// Numbers of the model that stand on a bound set by hand.
     pub bounds: Bounds,
-    /// Which faults are detected and told apart; none if no window of the log tells.
+    /// Which faults are detected and told apart; none if that was not asked for, or no window of
+    /// the log tells.
     pub isolability: Option<Isolability>,
 }
 
@@ -99,6 +103,17 @@ impl Report {
                 "predicted without {}: the commands driven do not tell it from lower powers; an \
                  order needs one more value of an axis than it counts, spread over its range",
                 words.join(", ")
+            ));
+        }
+    }
+
+    /// Warns of an angle of which such a part lies far from 0.
+    pub(super) fn astray(&mut self, channel: &str, part: f64) {
+        if part > ASTRAY {
+            self.warnings.push(format!(
+                "{channel}: {:.0} % of its readings lie beyond a quarter of its period: a period \
+                 suits an error, which stays around 0",
+                100.0 * part
             ));
         }
     }
@@ -168,21 +183,8 @@ impl fmt::Display for Report {
         if !self.faults.is_empty() {
             writeln!(f)?;
         }
-        for FaultFit {
-            fault,
-            runs,
-            runs_found,
-            is_used,
-        } in &self.faults
-        {
-            let used = match is_used {
-                true => "recognized by them",
-                false => "not recognized by them: too few",
-            };
-            writeln!(
-                f,
-                "{fault}: {runs_found} of {runs} runs found by what the other groups show, {used}"
-            )?;
+        for fault in &self.faults {
+            writeln!(f, "{fault}")?;
         }
         let lines = self.bounds.lines();
         if !lines.is_empty() {

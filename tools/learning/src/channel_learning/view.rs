@@ -25,6 +25,8 @@ pub struct View {
     pub command: Vec<Range>,
     /// Channels.
     pub channels: Vec<Channel>,
+    /// Declared faults that are recognized by labelled runs.
+    pub signatures: Vec<RecognizedFault>,
     /// Tails of the classes of faults.
     pub tails: Vec<Tail>,
     /// Alarm thresholds.
@@ -39,6 +41,15 @@ pub struct Channel {
     /// Everything as the file has it.
     #[serde(flatten)]
     pub learned: channel_model::Channel,
+}
+
+/// A declared fault that is recognized by labelled runs.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct RecognizedFault {
+    /// Its name.
+    pub fault: String,
+    /// Runs that it was learned from.
+    pub runs: usize,
 }
 
 impl View {
@@ -57,6 +68,11 @@ impl View {
             prediction: prediction(channel, model),
             learned: channel.clone(),
         };
+        let signatures = model.signatures.fault.iter();
+        let signatures = signatures.map(|one| RecognizedFault {
+            fault: one.fault.clone(),
+            runs: one.runs,
+        });
         Self {
             source,
             interval_s: model.interval_s,
@@ -64,6 +80,7 @@ impl View {
             widened: model.widened,
             command: model.command.clone(),
             channels: model.channel.iter().map(channel).collect(),
+            signatures: signatures.collect(),
             tails: model.tail.clone(),
             alarms: Alarm::all(&model.calibration, fault_rate_1_h),
         }
@@ -124,6 +141,15 @@ impl fmt::Display for View {
                 learned.variance[0].sqrt(),
                 learned.usual,
                 learned.held_out_ratio
+            )?;
+        }
+        if !self.signatures.is_empty() {
+            writeln!(f)?;
+        }
+        for RecognizedFault { fault, runs } in &self.signatures {
+            writeln!(
+                f,
+                "{fault} is recognized by what {runs} labelled runs showed"
             )?;
         }
         writeln!(f, "\nlog-odds without a fault, by class of faults")?;

@@ -46,7 +46,7 @@ pub fn learn(
         runs.iter().map(|run| observed(run, robot, model)).collect();
     let further = FurtherModel {
         frames_file: frames_file.to_owned(),
-        data_hash: data_hash(runs, f64::INFINITY),
+        data_hash: data_hash(runs, f64::INFINITY, &[]),
         runs: runs.iter().map(|run| run.id).collect(),
         yaw_rate: gyro(&seen, model),
         currents: currents(&seen, robot, model)?,

@@ -151,7 +151,7 @@ pub fn learn(
         .collect();
     let mut model = blank(robot, options);
     model.provenance = Provenance {
-        data_hash: data_hash(&learned, f64::INFINITY),
+        data_hash: data_hash(&learned, f64::INFINITY, &[]),
         runs_learned: learned.iter().map(|run| run.id).collect(),
         runs_held_out: runs
             .iter()

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::SensorFrame;
-use vigil_learning::channel_learning::{LogError, learn};
+use vigil_learning::channel_learning::{Log, LogError, learn};
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_robot::channel_model::{Model, Monitor, Observer, components};
@@ -75,7 +75,7 @@ fn weave(t: f64) -> [f64; 2] {
 
 fn model(length_s: f64) -> (Model, Vec<String>) {
     let runs = [run(0, length_s, weave, Fault::None)];
-    let (model, report) = learn(&runs, &[], f64::INFINITY, &robot(), &[]).unwrap();
+    let (model, report) = learn(&Log::of_healthy(&runs), &robot()).unwrap();
     (model, report.warnings)
 }
 
@@ -170,11 +170,8 @@ fn bias_and_scatter_are_found_and_healthy_driving_is_not() {
 fn a_log_that_lacks_what_a_model_needs_is_refused_by_name() {
     let refused = |drive: &dyn Fn(f64) -> [f64; 2]| {
         learn(
-            &[run(0, 100.0, drive, Fault::None)],
-            &[],
-            f64::INFINITY,
+            &Log::of_healthy(&[run(0, 100.0, drive, Fault::None)]),
             &robot(),
-            &[],
         )
         .unwrap_err()
     };
@@ -193,7 +190,7 @@ fn a_log_that_lacks_what_a_model_needs_is_refused_by_name() {
     let still = refused(&|_| [0.0, 0.0]);
     assert!(matches!(still, LogError::Still { .. }), "{still}");
     assert_eq!(
-        learn(&[], &[], f64::INFINITY, &robot(), &[]),
+        learn(&Log::of_healthy(&[]), &robot()),
         Err(LogError::NoRuns)
     );
 }
@@ -227,7 +224,7 @@ fn speeds_between_those_of_the_log_are_no_fault_and_what_it_does_not_tell_is_sai
         run
     };
     let log = [lagged(0, &two_speeds, 700.0)];
-    let (model, report) = learn(&log, &[], f64::INFINITY, &robot(), &[]).unwrap();
+    let (model, report) = learn(&Log::of_healthy(&log), &robot()).unwrap();
     assert_eq!(model.command[0].gaps, [[0.2, 0.5]]);
     let told = |text: &str| report.warnings.iter().any(|w| w.contains(text));
     assert!(
@@ -269,7 +266,7 @@ fn a_combination_of_commands_that_the_log_lacks_is_no_fault() {
         run
     };
     let log = [slipping(0, &straight_or_turning, 700.0)];
-    let (model, report) = learn(&log, &[], f64::INFINITY, &robot(), &[]).unwrap();
+    let (model, report) = learn(&Log::of_healthy(&log), &robot()).unwrap();
     let told = report.warnings.iter().any(|w| w.contains("without v*w: "));
     assert!(told, "{:?}", report.warnings);
     for id in 0..6 {
@@ -315,7 +312,7 @@ fn a_robot_without_a_geometry_is_learned_and_its_faults_are_named() {
         }
         run
     };
-    let (model, _) = learn(&[drive(0, 700.0, 1e9)], &[], f64::INFINITY, &robot, &[]).unwrap();
+    let (model, _) = learn(&Log::of_healthy(&[drive(0, 700.0, 1e9)]), &robot).unwrap();
     let names: Vec<&str> = model.channel.iter().map(|c| c.name.as_str()).collect();
     assert_eq!(names, ["yaw_rate", "speed"]);
     assert_eq!(first_alarm(&model, &robot, &drive(1, 120.0, 1e9)), None);
@@ -347,7 +344,7 @@ fn what_is_slow_in_one_axis_is_predicted_through_the_other() {
         run
     };
     let runs: Vec<Run> = (0..6).map(|id| slow(id, 1e9)).collect();
-    let (model, report) = learn(&runs, &[], f64::INFINITY, &car(), &[]).unwrap();
+    let (model, report) = learn(&Log::of_healthy(&runs), &car()).unwrap();
     let told = |text: &str| report.warnings.iter().any(|w| w.contains(text));
     assert!(
         model.knows_rest() && !told("at rest"),
@@ -378,7 +375,7 @@ fn columns_that_mean_something_else_are_refused_in_the_words_of_the_description(
     let refused = |change: &dyn Fn(&mut SensorFrame)| {
         let mut run = run(3, 60.0, weave, Fault::None);
         run.frames.iter_mut().for_each(change);
-        let refused = learn(&[run], &[], f64::INFINITY, &robot(), &[]).unwrap_err();
+        let refused = learn(&Log::of_healthy(&[run]), &robot()).unwrap_err();
         assert!(matches!(refused, LogError::Doubtful(_)), "{refused}");
         refused.to_string()
     };
@@ -420,7 +417,7 @@ fn one_doubtful_run_among_many_is_told_and_learned_from() {
         .frames
         .iter_mut()
         .for_each(|frame| frame.channel[2] *= -1.0);
-    let (_, report) = learn(&runs, &[], f64::INFINITY, &robot(), &[]).unwrap();
+    let (_, report) = learn(&Log::of_healthy(&runs), &robot()).unwrap();
     let told = |w: &String| {
         w.starts_with("1 of 5 runs are doubtful") && w.contains("run 2: signs: yaw_rate")
     };

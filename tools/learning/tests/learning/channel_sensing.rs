@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::SensorFrame;
-use vigil_learning::channel_learning::learn;
+use vigil_learning::channel_learning::{Log, learn};
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_robot::channel_model::{Model, Monitor, Observer};
@@ -97,7 +97,7 @@ fn sensed(robot: &Description, mut run: Run) -> Run {
 
 fn learned(robot: &Description) -> Model {
     let runs = [sensed(robot, run(0, 700.0, stop_and_go, stop_and_go))];
-    learn(&runs, &[], f64::INFINITY, robot, &[]).unwrap().0
+    learn(&Log::of_healthy(&runs), robot).unwrap().0
 }
 
 /// First alarm for 24 h between false alarms, s, and the channel with the highest log-odds then.

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::SensorFrame;
-use vigil_learning::channel_learning::{LabelledRun, Report, learn};
+use vigil_learning::channel_learning::{LabelledRun, Log, Report, learn};
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_robot::channel_model::{Model, Monitor, Observer, components};
@@ -24,13 +24,35 @@ name = "kite"
 kinematics = "none"
 command = []
 warm_up_s = {warm_up_s:.1}
-measured = {{ pose = false, wheel_rates = false, steer = false, yaw_rate = false, currents = false }}
-channel = [{{ name = "a" }}, {{ name = "b" }}, {{ name = "c" }}, {{ name = "d" }}]
-fault = [
-  {{ name = "engine" }},
-  {{ name = "rudder", group = "SURFACE", shows = ["a", "b"] }},
-  {{ name = "flap", group = "SURFACE", shows = ["c", "d"] }},
-]
+[measured]
+pose = false
+wheel_rates = false
+steer = false
+
+[[channel]]
+name = "a"
+
+[[channel]]
+name = "b"
+
+[[channel]]
+name = "c"
+
+[[channel]]
+name = "d"
+
+[[fault]]
+name = "engine"
+
+[[fault]]
+name = "rudder"
+group = "SURFACE"
+shows = ["a", "b"]
+
+[[fault]]
+name = "flap"
+group = "SURFACE"
+shows = ["c", "d"]
 "#
     ))
     .unwrap()
@@ -79,7 +101,11 @@ fn labelled<'a>(run: &'a Run, group: &'a str) -> LabelledRun<'a> {
 
 fn learned(robot: &Description, labelled: &[LabelledRun<'_>]) -> (Model, Report) {
     let healthy = [run(0, 700.0, 0.0, NOTHING)];
-    learn(&healthy, &[], f64::INFINITY, robot, labelled).unwrap()
+    let log = Log {
+        labelled,
+        ..Log::of_healthy(&healthy)
+    };
+    learn(&log, robot).unwrap()
 }
 
 /// First alarm of 24 h between false ones, s, and the most probable component two seconds later.
@@ -123,7 +149,7 @@ fn a_fault_of_labelled_runs_is_named_in_a_run_that_was_not_learned_from() {
     assert_eq!(report.faults.len(), 1);
     let fit = &report.faults[0];
     assert_eq!(
-        (fit.fault.as_str(), fit.runs, fit.runs_found),
+        (fit.fault.as_str(), fit.runs_with_onset, fit.runs_found),
         ("engine", 6, 6)
     );
     assert!(fit.is_used);
@@ -143,8 +169,77 @@ fn runs_of_one_group_alone_vouch_for_nothing() {
     let labels: Vec<LabelledRun<'_>> = runs.iter().map(|run| labelled(run, "monday")).collect();
     let (model, report) = learned(&robot(0.0), &labels);
     let fit = &report.faults[0];
-    assert_eq!((fit.runs, fit.runs_found, fit.is_used), (3, 0, false));
+    assert_eq!((fit.runs, fit.groups, fit.is_used), (3, 1, false));
+    assert!(fit.to_string().contains("one group"), "{fit}");
     assert!(model.signatures.is_empty());
+}
+
+#[test]
+fn runs_that_are_faulty_from_the_beginning_teach_nothing() {
+    let runs: Vec<Run> = (1..5).map(|id| run(id, 60.0, 1.0, ENGINE)).collect();
+    let groups = ["monday", "tuesday", "friday", "sunday"];
+    let label = |(run, group)| LabelledRun {
+        onset_s: 0.0,
+        ..labelled(run, group)
+    };
+    let labels: Vec<LabelledRun<'_>> = runs.iter().zip(groups).map(label).collect();
+    let (model, report) = learned(&robot(0.0), &labels);
+    let fit = &report.faults[0];
+    assert_eq!((fit.runs, fit.runs_with_onset, fit.is_used), (4, 0, false));
+    assert!(model.signatures.is_empty());
+}
+
+/// Probability that something is wrong, in the median of a healthy run.
+fn usual_p_fault(model: &Model, robot: &Description) -> f64 {
+    let mut monitor = Monitor::new(model, robot, Channels::PoseEncoders, 1.0).unwrap();
+    let mut observer = Observer::new(robot);
+    let mut found = Vec::new();
+    for frame in &run(90, 200.0, 0.0, NOTHING).frames {
+        if observer.push(frame).complete {
+            monitor.step(observer.history());
+            found.push(1.0 / (1.0 + (-monitor.report().log_odds).exp()));
+        }
+    }
+    found.sort_by(f64::total_cmp);
+    found[found.len() / 2]
+}
+
+#[test]
+fn a_signature_leaves_a_healthy_robot_in_peace() {
+    let robot = robot(0.0);
+    let (without, _) = learned(&robot, &[]);
+    let usual = usual_p_fault(&without, &robot);
+    for scale in [0.2, 0.35, 0.6, 1.0, 2.0] {
+        let runs: Vec<Run> = (1..5).map(|id| run(id, 60.0, scale, ENGINE)).collect();
+        let groups = ["monday", "tuesday", "friday", "sunday"];
+        let labels = runs
+            .iter()
+            .zip(groups)
+            .map(|(run, group)| labelled(run, group));
+        let (model, _) = learned(&robot, &labels.collect::<Vec<_>>());
+        let found = usual_p_fault(&model, &robot);
+        assert!(
+            found < 2.0 * usual + 0.01,
+            "{scale}: {found}, without {usual}"
+        );
+    }
+}
+
+#[test]
+fn a_model_is_of_the_faults_that_were_declared_when_it_was_learned() {
+    let robot = robot(0.0);
+    let (model, _) = learned(&robot, &[]);
+    model.check_robot(&robot).unwrap();
+    let mut other = robot.clone();
+    other.fault[1].shows.pop();
+    let refused = model.check_robot(&other).unwrap_err().to_string();
+    assert!(refused.contains("rudder (shows in a b)"), "{refused}");
+    let mut other = robot.clone();
+    other.warm_up_s = 3.0;
+    assert!(model.check_robot(&other).is_err());
+    let mut other = robot;
+    other.channel[2].period = Some(360.0);
+    assert!(model.check_robot(&other).is_err());
 }
 
 #[test]
@@ -181,7 +276,7 @@ fn a_warm_up_is_neither_learned_from_nor_watched() {
         }
         run
     };
-    let (model, _) = learn(&[cold(0, 700.0)], &[], f64::INFINITY, &robot, &[]).unwrap();
+    let (model, _) = learn(&Log::of_healthy(&[cold(0, 700.0)]), &robot).unwrap();
     assert!((model.channel[1].variance[0].sqrt() - NOISE / 5_f64.sqrt()).abs() < 0.003);
     assert_eq!(found(&model, &robot, &cold(2, 60.0)), None);
     let without = Description {
@@ -189,4 +284,30 @@ fn a_warm_up_is_neither_learned_from_nor_watched() {
         ..robot
     };
     assert!(found(&model, &without, &cold(2, 60.0)).is_some());
+}
+
+#[test]
+fn an_angle_is_the_same_after_a_period() {
+    let mut robot = robot(0.0);
+    robot.channel[0].period = Some(360.0);
+    let mut observer = Observer::new(&robot);
+    let mut seen = Vec::new();
+    // The first frame only says where the first observation begins; five make one.
+    let read = [
+        0.0, 1.0, -1.0, 2.0, 719.0, 361.0, 179.5, -179.5, 180.0, 181.0, -179.0,
+    ];
+    for (i, degrees) in read.into_iter().enumerate() {
+        let mut frame = SensorFrame::default();
+        frame.header.t_capture_ns = i as u64 * 20_000_000;
+        (frame.header.seq, frame.run_id) = (i as u64, 1);
+        frame.set_channel(0, degrees);
+        if observer.push(&frame).complete {
+            seen.push(observer.history().ago(0).unwrap().values[0].unwrap());
+        }
+    }
+    let expected = [0.4, -179.6];
+    assert_eq!(seen.len(), expected.len());
+    for (seen, expected) in seen.into_iter().zip(expected) {
+        assert!((seen - expected).abs() < 1e-9, "{seen} {expected}");
+    }
 }

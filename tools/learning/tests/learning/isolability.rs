@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::SensorFrame;
-use vigil_learning::channel_learning::{Isolability, learn};
+use vigil_learning::channel_learning::{Isolability, Log, learn};
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
 
@@ -53,7 +53,11 @@ fn report(wheel_rates: bool, drive: impl Fn(f64) -> [f64; 2]) -> Isolability {
         frames.push(frame);
     }
     let runs = [Run { id: 0, frames }];
-    let (_, report) = learn(&runs, &[], f64::INFINITY, &robot(wheel_rates), &[]).unwrap();
+    let log = Log {
+        isolability_at_h: Some(24.0),
+        ..Log::of_healthy(&runs)
+    };
+    let (_, report) = learn(&log, &robot(wheel_rates)).unwrap();
     report.isolability.unwrap()
 }
 

@@ -6,7 +6,9 @@ use vigil_robot::channel_model::fault_kind::{FaultKind, GAIN_SD, SHARE_SD, bias_
 use vigil_robot::channel_model::law::{BLOCK_S, BLOCKS, Law, Row};
 use vigil_robot::channel_model::model::Class;
 use vigil_robot::channel_model::window::OFFSET;
-use vigil_robot::channel_model::{Component, Model, Quantity, Target, components, drives, targets};
+use vigil_robot::channel_model::{
+    Component, Model, Places, Quantity, Target, components, drives, targets,
+};
 
 use super::snapshot::{DELAY_S, Snapshot};
 
@@ -139,7 +141,7 @@ pub(super) fn faults(robot: &Description, model: &Model, log: &[Snapshot]) -> Ve
         }
     }
     let drives = drives(robot);
-    let first = parts.len().saturating_sub(drives.len());
+    let first = Places::new(robot).drives;
     for (place, (part, drive)) in parts[first..].iter().zip(&drives).enumerate() {
         found.extend(drive_faults(part, place, drive.wheel));
     }

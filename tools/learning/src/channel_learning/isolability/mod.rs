@@ -6,7 +6,8 @@
 //! 1993, chapter 7). Each fault is put into windows of the log itself, whose residuals are added,
 //! and judged as the monitor does it: with the law, the threshold and the tails of the model.
 //!
-//! The sizes are stated, and a fault lasts. Not compared are noise, erratic and missing sensors.
+//! The sizes are stated, and a fault lasts. Not compared are noise, erratic and missing sensors,
+//! and declared faults.
 
 mod candidate;
 mod comparison;
@@ -40,8 +41,6 @@ use rule::Rule;
 use snapshot::Snapshot;
 use wait::Waits;
 
-/// Mean time between false alarms, h: the default of `detector.false_alarm_interval_h`.
-pub const FALSE_ALARM_INTERVAL_H: f64 = 24.0;
 /// Share of the windows that show a fault from which on it counts as told from a rival at once.
 const AT_ONCE: f64 = 0.5;
 /// The same below which it is not told at all.
@@ -65,6 +64,8 @@ pub(super) struct Task<'a> {
     pub scales: &'a Scales,
     /// The robot.
     pub robot: &'a Description,
+    /// Mean time between false alarms, h.
+    pub interval_h: f64,
 }
 
 /// Compares all faults; none if the model has no law or no alarm, or the log no whole window.
@@ -78,7 +79,7 @@ pub(super) fn report(task: &Task<'_>) -> Option<Isolability> {
     };
     let inseparable = study.never.iter().filter(|pair| !named(pair));
     Some(Isolability {
-        false_alarm_interval_h: FALSE_ALARM_INTERVAL_H,
+        false_alarm_interval_h: task.interval_h,
         windows: study.log.len(),
         faults: study.fault_reports(),
         groups: study.groups(),
@@ -111,7 +112,7 @@ impl<'a> Study<'a> {
         let faults = faults(robot, model, &log);
         let channels = Channels::PoseEncoders;
         let form = (channels, Form::LearnedBias);
-        let alarm = model.alarm_log_odds(form, FALSE_ALARM_INTERVAL_H, FAULT_RATE_1_H);
+        let alarm = model.alarm_log_odds(form, task.interval_h, FAULT_RATE_1_H);
         let tails = Class::ALL.map(|class| model.tail(channels, class).cloned());
         let rule = Rule {
             prior: component_prior(components(robot).len()),

@@ -26,6 +26,7 @@ fn rule(directions: &[(Vec<f64>, f64)]) -> Rule {
         place: i,
         wheel: None,
         largest: f64::MAX,
+        period: None,
     };
     Rule {
         law: Law::new(&directions, directions.len(), 0).unwrap(),

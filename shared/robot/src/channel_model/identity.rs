@@ -1,0 +1,77 @@
+//! What tells one robot from another, by a model of its channels.
+
+use std::fmt;
+
+use super::component::targets;
+use crate::description::Description;
+use crate::fault_table::DeclaredFault;
+
+/// All that a model and a description must have in common.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Identity {
+    /// Of the robot.
+    pub name: String,
+    /// Of the command's axes.
+    pub axes: Vec<String>,
+    /// Names and periods.
+    pub channels: Vec<(String, Option<f64>)>,
+    /// Interval of observations, s.
+    pub interval_s: f64,
+    /// First seconds of a run that are left out.
+    pub warm_up_s: f64,
+    /// Declared faults.
+    pub faults: Vec<DeclaredFault>,
+}
+
+impl Identity {
+    /// Of a robot by its description.
+    pub fn of_robot(robot: &Description) -> Self {
+        let channels = targets(robot).into_iter();
+        Self {
+            name: robot.name.clone(),
+            axes: robot.command.iter().map(|axis| axis.name.clone()).collect(),
+            channels: channels.map(|one| (one.name, one.period)).collect(),
+            interval_s: robot.interval_s,
+            warm_up_s: robot.warm_up_s,
+            faults: without_groups(&robot.fault),
+        }
+    }
+}
+
+/// The node above a leaf is the tree's matter alone.
+pub(super) fn without_groups(faults: &[DeclaredFault]) -> Vec<DeclaredFault> {
+    let bare = |fault: &DeclaredFault| DeclaredFault {
+        group: None,
+        ..fault.clone()
+    };
+    faults.iter().map(bare).collect()
+}
+
+/// All but the name.
+impl fmt::Display for Identity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "command {}; channels", self.axes.join(" "))?;
+        for (name, period) in &self.channels {
+            write!(f, " {name}")?;
+            if let Some(period) = period {
+                write!(f, " (period {period})")?;
+            }
+        }
+        write!(f, "; {} s", self.interval_s)?;
+        if self.warm_up_s > 0.0 {
+            write!(f, "; warm-up {} s", self.warm_up_s)?;
+        }
+        for (i, fault) in self.faults.iter().enumerate() {
+            write!(
+                f,
+                "{} {}",
+                ["", "; faults"][usize::from(i == 0)],
+                fault.name
+            )?;
+            if !fault.shows.is_empty() {
+                write!(f, " (shows in {})", fault.shows.join(" "))?;
+            }
+        }
+        Ok(())
+    }
+}
