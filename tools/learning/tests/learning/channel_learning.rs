@@ -393,7 +393,7 @@ fn columns_that_mean_something_else_are_refused_in_the_words_of_the_description(
     );
     let message = refused(&|frame| frame.channel.swap(0, 1));
     assert!(
-        message.contains("exchanged, or is w positive to the right?"),
+        message.contains("enc_L and enc_R fit when exchanged; or is w positive to the right?"),
         "{message}"
     );
     let message = refused(&|frame| frame.command[0] *= 1000.0);
