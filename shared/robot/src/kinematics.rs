@@ -5,7 +5,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::description::Description;
+use crate::description::{Description, Kinematics};
 
 /// Wheels of the six-wheel rover.
 pub const ROVER_WHEELS: usize = 6;
@@ -203,6 +203,22 @@ pub fn wrap_angle(angle_rad: f64) -> f64 {
     }
     let turned = (angle_rad + PI).rem_euclid(TAU) - PI;
     turned.clamp(-PI, PI)
+}
+
+/// Speed of a wheel's contact along the direction that it is driven in, as factors of the body's
+/// velocity forward and left (m/s) and its yaw rate (rad/s); none for a wheel that is steered, or
+/// without a geometry.
+#[must_use]
+pub fn contact_factors(robot: &Description, wheel: usize) -> Option<[f64; 3]> {
+    let at = robot.wheels.get(wheel)?;
+    match robot.kinematics {
+        Kinematics::Differential => Some([1.0, 0.0, -at.y]),
+        Kinematics::Omni3 => {
+            let reach = at.x.hypot(at.y).max(1e-9);
+            Some([-at.y / reach, at.x / reach, reach])
+        }
+        Kinematics::Ackermann6 | Kinematics::None => None,
+    }
 }
 
 #[cfg(test)]

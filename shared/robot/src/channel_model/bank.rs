@@ -353,13 +353,12 @@ impl Bank {
 
     /// A declared fault by the channels in which it shows.
     fn shifted(&self, fault: usize) -> Weighed {
-        let unit = &self.window.unit;
+        let Some(shift) = self.declared.shift(fault, self.first) else {
+            return Weighed::NONE;
+        };
+        let unit = |channel: usize| (self.window.unit[channel], self.bias_sd(channel));
         Weighed::over(JOINT_ONSETS.map(|first| {
-            let sd = |channel: usize| self.bias_sd(channel);
-            let law = (self.law(), self.first);
-            let Some(found) = self.declared.shift(fault, law, (unit, sd), first) else {
-                return Weighed::NONE;
-            };
+            let found = shift.weigh(self.law(), first, unit);
             Weighed {
                 log_ratio: self.law().log_ratio(found.less, found.penalty),
                 age_s: self.window.block_s() * self.law().blocks(first) as f64,

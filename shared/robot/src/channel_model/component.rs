@@ -9,6 +9,7 @@ use crate::channel::{Role, channels};
 use crate::description::{Description, Kinematics};
 use crate::fault_table::{DECLARED_MAX, DeclaredFault, SHOWN_MAX};
 use crate::frame_guard::{BEYOND_LIMITS, CURRENT_MAX_A};
+use crate::kinematics::contact_factors;
 
 /// What a channel measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -224,16 +225,12 @@ pub struct Drive {
 #[must_use]
 pub fn drives(robot: &Description) -> Vec<Drive> {
     let axes = robot.command.len().min(AXES);
-    // Speed of a wheel's contact along the direction that it is driven in.
-    let row = |x: f64, y: f64| match robot.kinematics {
-        Kinematics::Differential => vec![1.0, -y],
-        Kinematics::Omni3 => {
-            let reach = x.hypot(y).max(1e-9);
-            vec![-y / reach, x / reach, reach]
-        }
-        Kinematics::Ackermann6 | Kinematics::None => Vec::new(),
+    // By the axes of the command.
+    let row = |wheel: usize| match (robot.kinematics, contact_factors(robot, wheel)) {
+        (Kinematics::Differential, Some([forward, _, turn])) => vec![forward, turn],
+        (_, factors) => factors.map_or_else(Vec::new, Vec::from),
     };
-    let rows: Vec<Vec<f64>> = robot.wheels.iter().map(|w| row(w.x, w.y)).collect();
+    let rows: Vec<Vec<f64>> = (0..robot.wheels.len()).map(row).collect();
     let wheels = rows.len().min(DRIVES_MAX);
     let shares = axes > 0 && wheels > 0 && rows.iter().all(|row| row.len() >= axes);
     let inverse = shares.then(|| {

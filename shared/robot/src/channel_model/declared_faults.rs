@@ -1,9 +1,8 @@
 //! The faults that a description declares, weighed over the last few seconds.
 
-use super::CHANNELS_MAX;
 use super::component::Target;
-use super::law::{BLOCKS, Law, Row};
-use super::shift::{Shift, ShiftLaw};
+use super::law::{BLOCKS, Law};
+use super::shift::ShiftLaw;
 use super::signature::{Evidence, Signature, Signatures, means};
 use super::window::Window;
 use crate::description::Description;
@@ -105,18 +104,11 @@ impl DeclaredFaults {
         signature.map(|_| declared.evidence.log_ratio())
     }
 
-    /// What the window of `law`, of which whole blocks begin with `begin`, says of a shift of a
-    /// fault's channels from block `first` on; none if none are declared.
+    /// The law of a shift of a fault's channels in windows whose whole blocks begin with `begin`;
+    /// none if no channels are declared.
     #[must_use]
-    pub fn shift(
-        &self,
-        fault: usize,
-        (law, begin): (&Law, usize),
-        (unit, sd): (&[Row; CHANNELS_MAX], impl Fn(usize) -> f64),
-        first: usize,
-    ) -> Option<Shift> {
+    pub fn shift(&self, fault: usize, begin: usize) -> Option<&ShiftLaw> {
         let shifts = &self.all[fault].shifts;
-        let shift = shifts.get(begin.min(shifts.len().checked_sub(1)?))?;
-        Some(shift.weigh(law, first, |channel| (unit[channel], sd(channel))))
+        shifts.get(begin).or_else(|| shifts.last())
     }
 }

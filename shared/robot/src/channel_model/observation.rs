@@ -103,8 +103,10 @@ impl History {
     }
 }
 
-/// The commands smoothed up to now.
-fn smoothed(last: Option<&Observation>, now: &Observation) -> [[f64; AXES]; SMOOTHING_S.len()] {
+/// The commands smoothed up to now, with each of [`SMOOTHING_S`]: those of the last observation and
+/// this one's command.
+#[must_use]
+pub fn smoothed(last: Option<&Observation>, now: &Observation) -> [[f64; AXES]; SMOOTHING_S.len()] {
     let Some(last) = last else {
         return [now.command; SMOOTHING_S.len()];
     };

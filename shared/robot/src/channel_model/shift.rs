@@ -43,12 +43,6 @@ impl ShiftLaw {
         }
     }
 
-    /// The channels.
-    #[must_use]
-    pub fn channels(&self) -> &[usize] {
-        &self.channels
-    }
-
     /// What the window of `law` says of a shift from block `first` on; for each of the channels:
     /// the change by one unit, and the deviation of the amount.
     #[must_use]

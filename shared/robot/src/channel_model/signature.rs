@@ -17,7 +17,7 @@ use crate::fault_table::DECLARED_MAX;
 /// Newest blocks that each mean spans.
 const SPANS: [usize; 3] = [1, BLOCKS / 2, BLOCKS];
 /// Means of all channels at most.
-pub const MEANS_MAX: usize = SPANS.len() * CHANNELS_MAX;
+pub const MEANS_MAX: usize = means_count(CHANNELS_MAX);
 /// Phases of a signature at most.
 pub const PHASES_MAX: usize = 8;
 /// Deviations beyond which a mean says no more.
@@ -29,6 +29,12 @@ const NUMBER_MAX: f64 = 1e9;
 const LOG_RATIO_MAX: f64 = 40.0;
 /// Time constant over which ratios are averaged, s.
 const AVERAGE_S: f64 = 0.35;
+
+/// Means of so many channels.
+#[must_use]
+pub const fn means_count(channels: usize) -> usize {
+    SPANS.len() * channels
+}
 
 /// Means of the whitened residuals of all channels, span by span; missing ones are 0.
 pub type Means = [f64; MEANS_MAX];
@@ -91,7 +97,7 @@ impl Signatures {
     /// True if they are of this many channels.
     #[must_use]
     pub fn fits(&self, channels: usize) -> bool {
-        let n = SPANS.len() * channels;
+        let n = means_count(channels);
         let is_sane = |value: &f64| value.abs() <= NUMBER_MAX;
         let is_phase = |phase: &Phase| {
             let numbers = phase.weights.iter().chain([&phase.offset]);

@@ -22,6 +22,7 @@ use crate::description::{Description, Kinematics};
 use finding::WheelChannel;
 pub use finding::{Finding, FindingKind, YAW_RATE_UNITS};
 use pose::Poses;
+pub use regression::RegressionSums;
 pub use scope::Scope;
 pub use wheels::expected_rate;
 use wheels::{Group, Wheels};

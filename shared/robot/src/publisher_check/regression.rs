@@ -9,16 +9,17 @@ const FOLLOWS: f64 = 0.6;
 
 /// Sums of a channel against what is expected of it.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct RegressionSums {
+pub struct RegressionSums {
     /// Time over which they were taken, s.
     pub time_s: f64,
     found: f64,
     /// Squares of what is expected.
-    pub expected: f64,
+    pub(super) expected: f64,
     squares: f64,
 }
 
 impl RegressionSums {
+    /// Takes a value, and what is expected, over this time.
     pub fn add(&mut self, value: f64, expected: f64, dt_s: f64) {
         self.time_s += dt_s;
         self.found += value * expected * dt_s;
@@ -26,16 +27,23 @@ impl RegressionSums {
         self.squares += value * value * dt_s;
     }
 
-    pub fn ratio(&self) -> f64 {
+    /// Part of the channel's squares that what is expected explains.
+    #[must_use]
+    pub fn explained(&self) -> f64 {
+        let squares = (self.squares * self.expected).max(f64::MIN_POSITIVE);
+        self.found * self.found / squares
+    }
+
+    pub(super) fn ratio(&self) -> f64 {
         self.found / self.expected
     }
 
-    pub fn follows(&self) -> bool {
-        self.found * self.found > FOLLOWS * self.expected * self.squares
+    pub(super) fn follows(&self) -> bool {
+        self.explained() > FOLLOWS
     }
 
     /// True if it follows with the sign opposite to `sense`, 1 or -1.
-    pub fn is_reversed(&self, sense: f64) -> bool {
+    pub(super) fn is_reversed(&self, sense: f64) -> bool {
         (1.0 / REVERSED..=REVERSED).contains(&(sense * self.ratio())) && self.follows()
     }
 }

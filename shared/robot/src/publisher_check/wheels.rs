@@ -8,6 +8,7 @@ use super::regression::RegressionSums;
 use super::{FindingKind, Motion, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
 use crate::channel_map::ChannelMap;
 use crate::description::{Description, Kinematics, Wheel};
+use crate::kinematics::contact_factors;
 use crate::learned::wheels::{rolling_rate, steering_angle};
 
 /// Time in motion, s, and commanded rolling, rad, from which wheels are judged: twenty frames at
@@ -355,15 +356,16 @@ fn is_rolled(rate: &RegressionSums) -> bool {
 /// may all turn in the other sense.
 #[must_use]
 pub fn expected_rate(robot: &Description, wheel: usize, command: &[f64]) -> f64 {
-    let ([speed, left, turn], at) = (robot.twist(command), &robot.wheels[wheel]);
-    match robot.kinematics {
-        Kinematics::Ackermann6 => rolling_rate(robot, wheel, command[0], speed),
-        Kinematics::Omni3 => {
-            let reach_m = at.x.hypot(at.y).max(1e-9);
-            let speed_m_s = (at.x * left - at.y * speed) / reach_m + reach_m * turn;
-            speed_m_s / robot.wheel_radius_m
+    let twist = robot.twist(command);
+    match (robot.kinematics, contact_factors(robot, wheel)) {
+        (Kinematics::Ackermann6, _) => rolling_rate(robot, wheel, command[0], twist[0]),
+        (_, Some(factors)) => {
+            let parts = factors
+                .iter()
+                .zip(twist)
+                .map(|(factor, value)| factor * value);
+            parts.sum::<f64>() / robot.wheel_radius_m
         }
-        Kinematics::Differential => (speed - at.y * turn) / robot.wheel_radius_m,
-        Kinematics::None => 0.0,
+        (_, None) => 0.0,
     }
 }

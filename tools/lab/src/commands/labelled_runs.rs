@@ -52,7 +52,6 @@ pub(super) fn labelled_runs<'a>(
             run,
             fault: &label.mode,
             onset_s,
-            group: &label.group,
         });
     }
     Ok(found)

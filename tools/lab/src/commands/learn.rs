@@ -17,7 +17,7 @@ use vigil_robot::learned::model::Provenance;
 use vigil_robot::{Description, RobotModel};
 
 use super::files::{check_place, file_name, write_whole};
-use super::offline::{RobotArgs, hours, load_model};
+use super::offline::{IntervalArgs, RobotArgs, load_model};
 use vigil_terminal::{CommandError, Outcome};
 
 use super::learn_channels;
@@ -74,14 +74,8 @@ pub struct Args {
     /// of channels.
     #[arg(long, requires = "runs")]
     cross_validate: bool,
-    /// Mean time between false alarms, h, for which a model of channels is judged.
-    #[arg(
-        long,
-        value_name = "H",
-        value_parser = hours,
-        default_value_t = detect::Settings::default().false_alarm_interval_h
-    )]
-    false_alarm_interval: f64,
+    #[command(flatten)]
+    interval: IntervalArgs,
     #[command(flatten)]
     robot: RobotArgs,
     /// Print the report, or the model shown, as one JSON document.
@@ -291,7 +285,7 @@ fn channels(
         test_fraction: args.test_fraction,
         seed: args.seed,
         until_s: args.until.unwrap_or(f64::INFINITY),
-        false_alarm_interval_h: args.false_alarm_interval,
+        false_alarm_interval_h: args.interval.false_alarm_interval,
         cross_validate: args.cross_validate,
         json: args.json,
         labels: labels.as_deref(),

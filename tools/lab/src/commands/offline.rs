@@ -31,8 +31,21 @@ const DECISION: &str = "config/rover.pomdp";
 /// deadlines, so none is ever missed.
 const BLIND_MISSES: u32 = 1;
 
+/// How rare false alarms shall be.
+#[derive(Debug, clap::Args)]
+pub struct IntervalArgs {
+    /// Mean time between false alarms, h, for which a model is judged.
+    #[arg(
+        long,
+        value_name = "H",
+        value_parser = hours,
+        default_value_t = detect::Settings::default().false_alarm_interval_h
+    )]
+    pub false_alarm_interval: f64,
+}
+
 /// A time, h.
-pub fn hours(text: &str) -> Result<f64, String> {
+fn hours(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err("allowed is a number above 0".to_owned()),
@@ -78,14 +91,8 @@ pub struct FilterArgs {
     /// likelihood, or by a constant likelihood over windows.
     #[arg(long, value_name = "FORM", value_enum, default_value_t)]
     detector: Form,
-    /// Mean time between false alarms, h.
-    #[arg(
-        long,
-        value_name = "H",
-        value_parser = hours,
-        default_value_t = detect::Settings::default().false_alarm_interval_h
-    )]
-    false_alarm_interval: f64,
+    #[command(flatten)]
+    interval: IntervalArgs,
     /// Identification filter.
     #[arg(long, value_name = "NAME", value_enum, default_value_t)]
     pub identifier: IdentifierFilter,
@@ -223,7 +230,7 @@ impl FilterArgs {
         let settings = detect::Settings {
             sensors: channels(sensors),
             form: self.detector,
-            false_alarm_interval_h: self.false_alarm_interval,
+            false_alarm_interval_h: self.interval.false_alarm_interval,
             ..detect::Settings::default()
         };
         let refuse = |error: &dyn std::fmt::Display| {

@@ -15,7 +15,7 @@ use vigil_robot::Description;
 use vigil_robot::channel_model::channel::commands;
 use vigil_robot::channel_model::law::BLOCKS;
 use vigil_robot::channel_model::signature::{
-    Evidence, MEANS_MAX, Means, Phase, SD_MIN, Signature, Signatures, means,
+    Evidence, Means, Phase, SD_MIN, Signature, Signatures, means, means_count,
 };
 use vigil_robot::channel_model::window::Window;
 use vigil_robot::channel_model::{Model, Scales};
@@ -47,13 +47,13 @@ pub struct LabelledRun<'a> {
     pub fault: &'a str,
     /// Onset, s.
     pub onset_s: f64,
-    /// Runs of one group resemble each other beyond the fault: one day, one recording.
-    pub group: &'a str,
 }
 
 /// Means since the onset of a run.
 struct Sample<'a> {
     label: &'a LabelledRun<'a>,
+    /// Name of the run's group.
+    group: String,
     /// Age, s, and length of the observation, s.
     ages: Vec<[f64; 2]>,
     means: Vec<Means>,
@@ -114,14 +114,14 @@ impl fmt::Display for FaultFit {
 pub(super) fn fit(
     model: &mut Model,
     (models, records): (&[Model], &[Record]),
-    labelled: &[LabelledRun<'_>],
+    (labelled, groups): (&[LabelledRun<'_>], &[(u32, String)]),
     (robot, scales): (&Description, &Scales),
 ) -> Vec<FaultFit> {
     if labelled.is_empty() {
         return Vec::new();
     }
-    let healthy = healthy_means(models, records, scales);
-    let n = MEANS_MAX / vigil_robot::channel_model::CHANNELS_MAX * model.channel.len();
+    let mut healthy = healthy_means(models, records, scales);
+    let n = means_count(model.channel.len());
     let Some((mean, covariance)) = moments(&healthy, n) else {
         return Vec::new();
     };
@@ -133,11 +133,14 @@ pub(super) fn fit(
         sd: sd.clone(),
         fault: Vec::new(),
     };
+    for means in healthy.iter_mut().flat_map(|run| &mut run.means) {
+        *means = model.signatures.standardized(means);
+    }
     let health = Health {
         correlation: DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (sd[i] * sd[j])),
-        records: healthy_records(&healthy, &model.signatures),
+        runs: healthy,
     };
-    let samples = samples(model, labelled, (robot, scales));
+    let samples = samples(model, (labelled, groups), (robot, scales));
     let mut told = Vec::new();
     for fault in &robot.fault {
         let of_fault = samples.iter().filter(|one| one.label.fault == fault.name);
@@ -147,7 +150,7 @@ pub(super) fn fit(
         if labels == 0 {
             continue;
         }
-        let groups: BTreeSet<&str> = runs.iter().map(|run| run.label.group).collect();
+        let groups: BTreeSet<&str> = runs.iter().map(|run| run.group.as_str()).collect();
         let runs_found = found(&health, &fault.name, &runs);
         let signature = health.signature(&fault.name, &runs);
         let is_enough = groups.len() > 1 && 2 * runs_found >= runs.len();
@@ -179,7 +182,7 @@ struct Health {
     /// Correlation of the standardized means.
     correlation: DMatrix<f64>,
     /// Standardized means.
-    records: Vec<HealthyRun>,
+    runs: Vec<HealthyRun>,
 }
 
 /// Each part of the log seen through the model that has not seen it.
@@ -207,18 +210,6 @@ fn healthy_means(models: &[Model], records: &[Record], scales: &Scales) -> Vec<H
     out
 }
 
-fn healthy_records(healthy: &[HealthyRun], signatures: &Signatures) -> Vec<HealthyRun> {
-    let standardized = |run: &HealthyRun| HealthyRun {
-        dt_s: run.dt_s.clone(),
-        means: run
-            .means
-            .iter()
-            .map(|m| signatures.standardized(m))
-            .collect(),
-    };
-    healthy.iter().map(standardized).collect()
-}
-
 /// Mean and covariance of the first `n` means.
 fn moments(runs: &[HealthyRun], n: usize) -> Option<(DVector<f64>, DMatrix<f64>)> {
     let all = || runs.iter().flat_map(|run| &run.means);
@@ -244,7 +235,7 @@ fn vector(means: &Means, n: usize) -> DVector<f64> {
 /// the fault.
 fn samples<'a>(
     model: &Model,
-    labelled: &'a [LabelledRun<'a>],
+    (labelled, groups): (&'a [LabelledRun<'a>], &[(u32, String)]),
     (robot, scales): (&Description, &Scales),
 ) -> Vec<Sample<'a>> {
     let n = model.channel.len();
@@ -253,6 +244,7 @@ fn samples<'a>(
     let mut sample = |label: &'a LabelledRun<'a>| {
         let mut out = Sample {
             label,
+            group: record::group(label.run, groups),
             ages: Vec::new(),
             means: Vec::new(),
         };
@@ -341,7 +333,7 @@ impl Health {
             let observations = run.dt_s.iter().zip(&run.means);
             highest(signature, observations.map(|(dt_s, m)| (*dt_s, m)))
         };
-        self.records.iter().map(of_run).fold(0.0, f64::max)
+        self.runs.iter().map(of_run).fold(0.0, f64::max)
     }
 }
 
@@ -359,13 +351,13 @@ fn highest<'a>(signature: &Signature, means: impl Iterator<Item = (f64, &'a Mean
 fn found(health: &Health, fault: &str, runs: &[&Sample<'_>]) -> usize {
     let mut by_group: BTreeMap<&str, Vec<&Sample<'_>>> = BTreeMap::new();
     for run in runs {
-        by_group.entry(run.label.group).or_default().push(run);
+        by_group.entry(&run.group).or_default().push(run);
     }
     let mut found = 0;
     for (group, left_out) in &by_group {
         let others: Vec<&Sample<'_>> = runs
             .iter()
-            .filter(|run| run.label.group != *group)
+            .filter(|run| run.group != *group)
             .copied()
             .collect();
         let signature = health.signature(fault, &others);

@@ -203,7 +203,7 @@ pub fn learn(log: &Log<'_>, robot: &Description) -> Result<(Model, Report), LogE
     report.faults = labelled::fit(
         &mut model,
         (&models, &records),
-        log.labelled,
+        (log.labelled, log.groups),
         (robot, &scales),
     );
     for part in &mut models {

@@ -68,6 +68,15 @@ pub(super) fn all(runs: &[&Run], until_s: f64, robot: &Description) -> Vec<Recor
     grouped(runs, &[], until_s, robot)
 }
 
+/// Name of a run's group; one without is a group of its own.
+pub(super) fn group(run: &Run, groups: &[(u32, String)]) -> String {
+    let group = groups.iter().find(|(id, _)| *id == run.id);
+    group.map_or_else(
+        || format!("run {}", run.id),
+        |(_, name)| format!("group {name}"),
+    )
+}
+
 /// The runs up to a time, s. Those of one group are in one part, if there are groups enough.
 pub(super) fn grouped(
     runs: &[&Run],
@@ -75,17 +84,10 @@ pub(super) fn grouped(
     until_s: f64,
     robot: &Description,
 ) -> Vec<Record> {
-    let name = |run: &Run| {
-        let group = groups.iter().find(|(id, _)| *id == run.id);
-        group.map_or_else(
-            || format!("run {}", run.id),
-            |(_, name)| format!("group {name}"),
-        )
-    };
     let mut names: Vec<String> = Vec::new();
     let mut places = Vec::with_capacity(runs.len());
     for run in runs {
-        let name = name(run);
+        let name = group(run, groups);
         let place = names.iter().position(|other| *other == name);
         places.push(place.unwrap_or(names.len()));
         if place.is_none() {

@@ -11,28 +11,18 @@ use vigil_robot::channel_model::{Model, Monitor, Observer, components};
 use vigil_robot::learned::Form;
 use vigil_robot::learned::channels::Channels;
 
+use super::small::small;
+
 const TRACK_M: f64 = 0.2;
 const RADIUS_M: f64 = 0.1;
 const NOISE_RAD_S: f64 = 0.05;
 const RATE_HZ: f64 = 50.0;
 
 fn robot() -> Description {
-    toml::from_str(
-        r#"
-name = "small"
-kinematics = "differential"
-wheel_radius_m = 0.1
-command = [{ name = "v", unit = "m/s", limit = 1.0 }, { name = "w", unit = "rad/s", limit = 2.0 }]
-wheels = [
-  { name = "L", x = 0.0, y = 0.1, steered = false },
-  { name = "R", x = 0.0, y = -0.1, steered = false },
-]
-measured = { pose = false, wheel_rates = true, steer = false, yaw_rate = true, currents = false }
-polynomial_order = 2
-limits = { speed_m_s = 1.0, yaw_rate_rad_s = 2.0, wheel_rate_rad_s = 50.0 }
-"#,
+    small(
+        "measured = { pose = false, wheel_rates = true, steer = false, yaw_rate = true }\n\
+         polynomial_order = 2",
     )
-    .unwrap()
 }
 
 /// What is wrong with the gyro from a time on.

@@ -12,28 +12,15 @@ use vigil_robot::learned::Form;
 use vigil_robot::learned::channels::Channels;
 use vigil_robot::slot::Slot;
 
+use super::small::small;
+
 const RATE_HZ: f64 = 20.0;
 
 fn robot(has_wheel_rates: bool) -> Description {
-    let text = format!(
-        r#"
-name = "small"
-kinematics = "differential"
-wheel_radius_m = 0.1
-command = [
-  {{ name = "v", unit = "m/s", limit = 1.0 }},
-  {{ name = "w", unit = "rad/s", limit = 2.0 }},
-]
-wheels = [
-  {{ name = "L", x = 0.0, y = 0.1, steered = false }},
-  {{ name = "R", x = 0.0, y = -0.1, steered = false }},
-]
-measured = {{ pose = true, wheel_rates = {has_wheel_rates}, steer = false }}
-polynomial_order = 1
-limits = {{ speed_m_s = 1.0, yaw_rate_rad_s = 2.0, wheel_rate_rad_s = 50.0 }}
-"#
-    );
-    toml::from_str(&text).unwrap()
+    small(&format!(
+        "measured = {{ pose = true, wheel_rates = {has_wheel_rates}, steer = false }}\n\
+         polynomial_order = 1"
+    ))
 }
 
 /// Command kept up for four seconds each; one of five is rest.

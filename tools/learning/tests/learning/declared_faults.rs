@@ -90,19 +90,32 @@ fn run(id: u32, length_s: f64, scale: f64, effect: Effect) -> Run {
     Run { id, frames }
 }
 
-fn labelled<'a>(run: &'a Run, group: &'a str) -> LabelledRun<'a> {
-    LabelledRun {
-        run,
-        fault: "engine",
-        onset_s: ONSET_S,
-        group,
-    }
+/// A model of ten minutes without a fault, and of runs in which the engine fails, each of a group.
+fn learned(robot: &Description, failed: &[Run], groups: &[&str]) -> (Model, Report) {
+    learned_from(robot, failed, groups, ONSET_S)
 }
 
-fn learned(robot: &Description, labelled: &[LabelledRun<'_>]) -> (Model, Report) {
+/// The same of runs that are labelled with another onset.
+fn learned_from(
+    robot: &Description,
+    failed: &[Run],
+    groups: &[&str],
+    onset_s: f64,
+) -> (Model, Report) {
     let healthy = [run(0, 700.0, 0.0, NOTHING)];
+    let label = |run| LabelledRun {
+        run,
+        fault: "engine",
+        onset_s,
+    };
+    let labelled: Vec<LabelledRun<'_>> = failed.iter().map(label).collect();
+    let groups = failed.iter().zip(groups);
+    let groups: Vec<(u32, String)> = groups
+        .map(|(run, &group)| (run.id, group.to_owned()))
+        .collect();
     let log = Log {
-        labelled,
+        labelled: &labelled,
+        groups: &groups,
         ..Log::of_healthy(&healthy)
     };
     learn(&log, robot).unwrap()
@@ -141,11 +154,7 @@ fn a_fault_of_labelled_runs_is_named_in_a_run_that_was_not_learned_from() {
         .map(|id| run(id, 60.0, 0.7 + 0.1 * f64::from(id), ENGINE))
         .collect();
     let groups = ["monday", "monday", "tuesday", "tuesday", "friday", "friday"];
-    let labels = runs
-        .iter()
-        .zip(groups)
-        .map(|(run, group)| labelled(run, group));
-    let (model, report) = learned(&robot, &labels.collect::<Vec<_>>());
+    let (model, report) = learned(&robot, &runs, &groups);
     assert_eq!(report.faults.len(), 1);
     let fit = &report.faults[0];
     assert_eq!(
@@ -166,8 +175,7 @@ fn a_fault_of_labelled_runs_is_named_in_a_run_that_was_not_learned_from() {
 #[test]
 fn runs_of_one_group_alone_vouch_for_nothing() {
     let runs: Vec<Run> = (1..4).map(|id| run(id, 60.0, 1.0, ENGINE)).collect();
-    let labels: Vec<LabelledRun<'_>> = runs.iter().map(|run| labelled(run, "monday")).collect();
-    let (model, report) = learned(&robot(0.0), &labels);
+    let (model, report) = learned(&robot(0.0), &runs, &["monday"; 3]);
     let fit = &report.faults[0];
     assert_eq!((fit.runs, fit.groups, fit.is_used), (3, 1, false));
     assert!(fit.to_string().contains("one group"), "{fit}");
@@ -178,12 +186,7 @@ fn runs_of_one_group_alone_vouch_for_nothing() {
 fn runs_that_are_faulty_from_the_beginning_teach_nothing() {
     let runs: Vec<Run> = (1..5).map(|id| run(id, 60.0, 1.0, ENGINE)).collect();
     let groups = ["monday", "tuesday", "friday", "sunday"];
-    let label = |(run, group)| LabelledRun {
-        onset_s: 0.0,
-        ..labelled(run, group)
-    };
-    let labels: Vec<LabelledRun<'_>> = runs.iter().zip(groups).map(label).collect();
-    let (model, report) = learned(&robot(0.0), &labels);
+    let (model, report) = learned_from(&robot(0.0), &runs, &groups, 0.0);
     let fit = &report.faults[0];
     assert_eq!((fit.runs, fit.runs_with_onset, fit.is_used), (4, 0, false));
     assert!(model.signatures.is_empty());
@@ -207,16 +210,12 @@ fn usual_p_fault(model: &Model, robot: &Description) -> f64 {
 #[test]
 fn a_signature_leaves_a_healthy_robot_in_peace() {
     let robot = robot(0.0);
-    let (without, _) = learned(&robot, &[]);
+    let (without, _) = learned(&robot, &[], &[]);
     let usual = usual_p_fault(&without, &robot);
     for scale in [0.2, 0.35, 0.6, 1.0, 2.0] {
         let runs: Vec<Run> = (1..5).map(|id| run(id, 60.0, scale, ENGINE)).collect();
         let groups = ["monday", "tuesday", "friday", "sunday"];
-        let labels = runs
-            .iter()
-            .zip(groups)
-            .map(|(run, group)| labelled(run, group));
-        let (model, _) = learned(&robot, &labels.collect::<Vec<_>>());
+        let (model, _) = learned(&robot, &runs, &groups);
         let found = usual_p_fault(&model, &robot);
         assert!(
             found < 2.0 * usual + 0.01,
@@ -228,7 +227,7 @@ fn a_signature_leaves_a_healthy_robot_in_peace() {
 #[test]
 fn a_model_is_of_the_faults_that_were_declared_when_it_was_learned() {
     let robot = robot(0.0);
-    let (model, _) = learned(&robot, &[]);
+    let (model, _) = learned(&robot, &[], &[]);
     model.check_robot(&robot).unwrap();
     let mut other = robot.clone();
     other.fault[1].shows.pop();
@@ -245,7 +244,7 @@ fn a_model_is_of_the_faults_that_were_declared_when_it_was_learned() {
 #[test]
 fn a_declared_fault_is_named_by_its_channels_and_a_sensor_by_its_own() {
     let robot = robot(0.0);
-    let (model, report) = learned(&robot, &[]);
+    let (model, report) = learned(&robot, &[], &[]);
     assert!(report.faults.is_empty());
     let cases: [(Effect, &str); 4] = [
         (|_| [0.08, 0.06, 0.0, 0.0], "rudder"),

@@ -8,29 +8,17 @@ use vigil_learning::channel_learning::{Isolability, Log, learn};
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
 
+use super::small::small;
+
 const NOISE: f64 = 0.02;
 
 fn robot(wheel_rates: bool) -> Description {
-    toml::from_str(&format!(
-        r#"
-name = "small"
-kinematics = "differential"
-wheel_radius_m = 0.1
-command = [
-  {{ name = "v", unit = "m/s", limit = 1.0 }},
-  {{ name = "w", unit = "rad/s", limit = 2.0 }},
-]
-wheels = [
-  {{ name = "L", x = 0.0, y = 0.1, steered = false }},
-  {{ name = "R", x = 0.0, y = -0.1, steered = false }},
-]
-channel = [{{ name = "speed", role = "other", unit = "m/s" }}]
-measured = {{ pose = false, wheel_rates = {wheel_rates}, steer = false, yaw_rate = true }}
-polynomial_order = 2
-limits = {{ speed_m_s = 1.0, yaw_rate_rad_s = 2.0, wheel_rate_rad_s = 50.0 }}
-"#
+    small(&format!(
+        "channel = [{{ name = 'speed', role = 'other', unit = 'm/s' }}]\n\
+         measured = {{ pose = false, wheel_rates = {wheel_rates}, steer = false, \
+         yaw_rate = true }}\n\
+         polynomial_order = 2"
     ))
-    .unwrap()
 }
 
 /// What learning says of ten minutes; `drive` gives speed and yaw rate commanded at a time.

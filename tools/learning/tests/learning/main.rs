@@ -9,3 +9,4 @@ mod isolability;
 mod learning;
 mod refusals;
 mod rover;
+mod small;

@@ -1,6 +1,6 @@
 //! Whether the command in a frame is the one that the robot followed when it was captured.
 
-use vigil_robot::publisher_check::expected_rate;
+use vigil_robot::publisher_check::{RegressionSums, expected_rate};
 use vigil_robot::{ChannelMap, Description};
 
 use super::FrameArrival;
@@ -17,14 +17,6 @@ const TOLD: f64 = 0.5;
 const UNEXPLAINED_MAX: f64 = 0.3;
 /// Frames from which it is judged, beside twice the longest shift.
 const FRAMES_MIN: usize = 50;
-
-/// Sums of measured against commanded values at one shift.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    found: f64,
-    measured: f64,
-    commanded: f64,
-}
 
 /// The finding; none where nothing measures the motion.
 pub fn finding(robot: &Description, frames: &[FrameArrival]) -> Option<Finding> {
@@ -103,17 +95,13 @@ fn signals(robot: &Description, frames: &[FrameArrival]) -> Vec<Vec<[f64; 2]>> {
 /// Part of the measured motion that the command of `shift` frames later leaves unexplained.
 fn unexplained(signals: &[Vec<[f64; 2]>], shift: i64, most: usize) -> f64 {
     let part = |signal: &Vec<[f64; 2]>| {
-        let mut sums = Sums::default();
+        let mut sums = RegressionSums::default();
         let last = signal.len().saturating_sub(most);
         for at in most..last {
-            let measured = signal[at][0];
             let commanded = signal[at.saturating_add_signed(shift as isize)][1];
-            sums.found += measured * commanded;
-            sums.measured += measured * measured;
-            sums.commanded += commanded * commanded;
+            sums.add(signal[at][0], commanded, 1.0);
         }
-        let squares = (sums.measured * sums.commanded).max(f64::MIN_POSITIVE);
-        1.0 - sums.found * sums.found / squares
+        1.0 - sums.explained()
     };
     signals.iter().map(part).sum::<f64>() / signals.len().max(1) as f64
 }

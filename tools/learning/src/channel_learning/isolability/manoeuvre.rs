@@ -2,7 +2,7 @@
 
 use vigil_robot::channel_model::channel::commands;
 use vigil_robot::channel_model::law::{BLOCK_S, BLOCKS, Law};
-use vigil_robot::channel_model::observation::SMOOTHING_S;
+use vigil_robot::channel_model::observation::smoothed;
 use vigil_robot::channel_model::window::{DELAY_BLOCKS, Window};
 use vigil_robot::channel_model::{AXES, History, Model, Observation, Range, Scales};
 
@@ -78,17 +78,11 @@ impl Manoeuvre {
             let mut now = Observation {
                 dt_s,
                 command,
-                smoothed: last.smoothed,
                 moving,
                 moving_s: if moving { last.moving_s + dt_s } else { 0.0 },
                 ..last
             };
-            for (smoothed, time_s) in now.smoothed.iter_mut().zip(SMOOTHING_S) {
-                let part = 1.0 - (-dt_s / time_s).exp();
-                for (value, command) in smoothed.iter_mut().zip(command) {
-                    *value += part * (command - *value);
-                }
-            }
+            now.smoothed = smoothed(Some(&last), &now);
             let mut ahead = history;
             ahead.push(now);
             for (value, channel) in now.values.iter_mut().zip(&model.channel) {
