@@ -17,6 +17,7 @@ pub mod real_logs;
 pub mod results;
 pub mod run_time;
 pub mod simulated;
+pub mod taped_wheels;
 
 /// What the question of this name ends with: 0, or 1 and the reason.
 pub fn ended(name: &str, result: Result<(), Box<dyn Error>>) -> ExitCode {

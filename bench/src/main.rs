@@ -55,6 +55,8 @@ enum Question {
     RealLogs(real_logs::Args),
     /// How many lines of code does each room have, and what do the services link?
     Size(size::Args),
+    /// Are taped wheels of a real robot found, and told apart?
+    TapedWheels,
     /// Writes bench/README.md anew from the results
     Page,
     #[command(flatten)]
@@ -87,6 +89,7 @@ impl Question {
             Self::Promise(args) => promise::run(args),
             Self::RealLogs(args) => real_logs::run(args),
             Self::Size(args) => size::run(args),
+            Self::TapedWheels => taped_wheels::run(),
             Self::Page => write_page(),
             Self::Role(role) => role.play(),
         }

@@ -12,3 +12,4 @@ pub mod peers;
 pub mod promise;
 pub mod real_logs;
 pub mod size;
+pub mod taped_wheels;

@@ -27,7 +27,7 @@ pub fn tolerances(split: &Split) -> Result<Vec<f64>, Box<dyn Error>> {
             if !observer.push(frame).complete {
                 continue;
             }
-            monitor.step(observer.history());
+            monitor.step(observer.history(), observer.orders());
             if !observer.history().ago(0).is_some_and(|now| now.moving) {
                 continue;
             }

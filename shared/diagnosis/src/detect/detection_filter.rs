@@ -85,7 +85,7 @@ impl DetectionFilter {
                 observation.into()
             }
             Self::Channels { observer, monitor } => {
-                monitor.step(observer.history());
+                monitor.step(observer.history(), observer.orders());
                 // A complete observation is the newest of the history.
                 let newest = observer.history().ago(0);
                 newest.map_or_else(Interval::default, |now| Interval {

@@ -4,7 +4,7 @@ use vigil_blocks::{
     DetectionBelief, Entry, FAULT_NODES, FaultBelief, FaultSet, MODE_UNKNOWN, ParticleBlock,
     Readiness,
 };
-use vigil_robot::channel_model::monitor::ComponentBelief;
+use vigil_robot::channel_model::monitor::{ComponentBelief, PairBelief};
 use vigil_robot::channel_model::{Model, Monitor, Observer, components};
 use vigil_robot::{ChannelMap, Description, FaultTree};
 
@@ -22,8 +22,10 @@ const TELLING_LOG_ODDS: f64 = 0.0;
 /// What is believed of the components, given that something is wrong.
 #[derive(Debug, Clone, Copy)]
 struct Verdict {
-    /// Probability of each node's leaf.
+    /// Probability of each node's leaf alone.
     leaves: [f64; FAULT_NODES],
+    /// Two leaves at once.
+    pair: FaultSet,
     unknown: f64,
     size: [f64; FAULT_NODES],
     size_sd: [f64; FAULT_NODES],
@@ -36,6 +38,7 @@ struct Verdict {
 
 const NO_VERDICT: Verdict = Verdict {
     leaves: [0.0; FAULT_NODES],
+    pair: FaultSet { leaves: 0, p: 0.0 },
     unknown: 1.0,
     size: [0.0; FAULT_NODES],
     size_sd: [0.0; FAULT_NODES],
@@ -136,7 +139,8 @@ impl ChannelIdentifier {
                     predicted = self.posterior;
                 }
                 if outcome.complete {
-                    self.monitor.step(self.observer.history());
+                    let (history, orders) = (self.observer.history(), self.observer.orders());
+                    self.monitor.step(history, orders);
                     if self.monitor.report().log_odds > TELLING_LOG_ODDS {
                         self.judge();
                     }
@@ -190,6 +194,13 @@ impl ChannelIdentifier {
                 best[1] = (p, node);
             }
         }
+        if let Some(PairBelief { p, components }) = self.monitor.pair()
+            && let [Some(first), Some(second)] = components.map(|component| self.leaf[component])
+        {
+            let leaves = 1 << first | 1 << second;
+            verdict.pair = FaultSet { leaves, p };
+            named += p;
+        }
         // The window shows the last seconds alone: a fault that stands began before.
         let before = &self.verdict;
         if self.alarm_t_ns != 0 && before.likeliest == verdict.likeliest && before.onset_ns != 0 {
@@ -199,6 +210,7 @@ impl ChannelIdentifier {
         // Probabilities that sum to a little more than one, by rounding, sum to one.
         let most = named.max(1.0);
         verdict.leaves.iter_mut().for_each(|p| *p /= most);
+        verdict.pair.p /= most;
         verdict.runner_up = match best {
             [_, (p, node)] if p > verdict.unknown => node as u32,
             _ => MODE_UNKNOWN,
@@ -232,7 +244,13 @@ impl ChannelIdentifier {
             };
             belief.add(set, &self.leaves);
         }
-        let named: f64 = belief.nodes[0] + p_fault * self.verdict.leaves.iter().sum::<f64>();
+        let pair = self.verdict.pair;
+        if pair.leaves != 0 {
+            let p = p_fault * pair.p;
+            belief.add(FaultSet { p, ..pair }, &self.leaves);
+        }
+        let leaves: f64 = self.verdict.leaves.iter().sum();
+        let named = belief.nodes[0] + p_fault * (leaves + pair.p);
         belief.unknown = (1.0 - named).clamp(0.0, 1.0);
         belief.entropy += crate::identify::tree_belief::entropy(belief.unknown);
         self.posterior = belief;

@@ -8,6 +8,7 @@ use super::component::Target;
 use super::declared_faults::DeclaredFaults;
 use super::fault_kind::{DECLARED_KINDS, FaultKind, GAIN_SD, SENSOR_KINDS, bias_sd};
 use super::law::{BLOCKS, Change, Law, Row};
+use super::orders::WheelOrders;
 use super::scatter::ScatterLaw;
 use super::window::{DELAY_BLOCKS, Window};
 use super::{CHANNELS_MAX, COMPONENTS_MAX};
@@ -152,6 +153,7 @@ impl Bank {
     /// Forgets the run.
     pub fn reset(&mut self) {
         self.clear();
+        self.declared.reset();
         self.window.reset();
     }
 
@@ -213,6 +215,11 @@ impl Bank {
     /// The law of the window as it is.
     fn law(&self) -> &Law {
         &self.laws.mean[self.first.min(self.laws.mean.len() - 1)]
+    }
+
+    /// Takes what the wheels show up to the end of an observation that lasted `dt_s`.
+    pub fn take_orders(&mut self, orders: &[WheelOrders], dt_s: f64) {
+        self.declared.take_orders(orders, dt_s);
     }
 
     /// Weighs all faults; `measured`: what of the channels the newest observation holds, which
@@ -334,7 +341,8 @@ impl Bank {
         for (k, kind) in DECLARED_KINDS.into_iter().enumerate() {
             self.weighed[component][k] = match kind {
                 FaultKind::Shift => self.shifted(fault),
-                FaultKind::Signature => self.recognized(fault),
+                FaultKind::Signature if !self.declared.is_turning(fault) => self.recognized(fault),
+                FaultKind::Turning if self.declared.is_turning(fault) => self.recognized(fault),
                 _ => Weighed::NONE,
             };
         }

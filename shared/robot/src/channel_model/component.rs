@@ -80,6 +80,13 @@ impl Target {
             false => &self.name,
         }
     }
+
+    /// True if it is the rate of the wheel of this name.
+    #[must_use]
+    pub fn is_rate_of(&self, robot: &Description, wheel: &str) -> bool {
+        let of = self.wheel.and_then(|wheel| robot.wheels.get(wheel));
+        self.quantity == Quantity::WheelRate && of.is_some_and(|of| of.name == wheel)
+    }
 }
 
 fn predicted(robot: &Description) -> Vec<Target> {
@@ -157,12 +164,16 @@ pub fn unfit(robot: &Description) -> Option<String> {
         return Some(format!("{found} faults: allowed are {DECLARED_MAX}"));
     }
     let components = components(robot);
-    let unfit = |fault: &DeclaredFault| unfit_fault(fault, &all, &components);
+    let unfit = |fault: &DeclaredFault| unfit_fault(fault, robot, (&all, &components));
     robot.fault.iter().find_map(unfit)
 }
 
 /// Why a declared fault cannot be watched; none if it can.
-fn unfit_fault(fault: &DeclaredFault, all: &[Target], components: &[Component]) -> Option<String> {
+fn unfit_fault(
+    fault: &DeclaredFault,
+    robot: &Description,
+    (all, components): (&[Target], &[Component]),
+) -> Option<String> {
     let name = &fault.name;
     let is_letter = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     let is_word = |word: &String| !word.is_empty() && word.chars().all(is_letter);
@@ -196,6 +207,14 @@ fn unfit_fault(fault: &DeclaredFault, all: &[Target], components: &[Component]) 
         let found = fault.shows.len();
         return Some(format!(
             "fault '{name}' shows in {found} channels: allowed are {SHOWN_MAX}"
+        ));
+    }
+    if let Some(wheel) = &fault.wheel
+        && !all.iter().any(|target| target.is_rate_of(robot, wheel))
+    {
+        return Some(format!(
+            "fault '{name}' comes back with the turns of '{wheel}', which is no wheel whose rate is \
+             measured"
         ));
     }
     let is_unknown = |shown: &&String| all.iter().all(|target| target.name != **shown);
@@ -328,6 +347,10 @@ pub fn components(robot: &Description) -> Vec<Component> {
         let wheel = wheel.and_then(|wheel| robot.wheels.get(wheel));
         Some(wheel.map_or("BODY".to_owned(), |wheel| format!("WHEEL_{}", wheel.name)))
     };
+    let group_of = |declared: &DeclaredFault| {
+        let name = declared.wheel.as_ref()?;
+        group(robot.wheels.iter().position(|wheel| wheel.name == *name))
+    };
     let mut out: Vec<Component> = Vec::new();
     for target in targets(robot) {
         let name = target.component().to_owned();
@@ -353,7 +376,7 @@ pub fn components(robot: &Description) -> Vec<Component> {
             .map(|declared| Component {
                 name: declared.name.clone(),
                 fault: format!("fault:{}", declared.name),
-                group: declared.group.clone(),
+                group: declared.group.clone().or_else(|| group_of(declared)),
             }),
     );
     out

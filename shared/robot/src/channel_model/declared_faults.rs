@@ -2,10 +2,13 @@
 
 use super::component::Target;
 use super::law::{BLOCKS, Law};
+use super::orders::WheelOrders;
 use super::shift::ShiftLaw;
 use super::signature::{Evidence, Signature, Signatures, means};
+use super::turning::{TurningSignature, TurningSignatures, WheelNoise};
 use super::window::Window;
 use crate::description::Description;
+use crate::fault_table::DeclaredFault;
 
 /// One fault at work.
 #[derive(Debug, Clone)]
@@ -15,7 +18,54 @@ struct Declared {
     shifts: Vec<ShiftLaw>,
     /// How it showed in labelled runs.
     signature: Option<Signature>,
+    /// How it came back in them with the turns of a wheel.
+    turning: Option<Turning>,
     evidence: Evidence,
+}
+
+/// A fault that comes back with the turns of a wheel.
+#[derive(Debug, Clone)]
+struct Turning {
+    wheel: usize,
+    noise: WheelNoise,
+    signature: TurningSignature,
+}
+
+impl Turning {
+    fn new(
+        robot: &Description,
+        fault: &DeclaredFault,
+        learned: &TurningSignatures,
+    ) -> Option<Self> {
+        let name = fault.wheel.as_ref()?;
+        let mut signatures = learned.fault.iter();
+        Some(Self {
+            wheel: robot.wheels.iter().position(|wheel| wheel.name == *name)?,
+            noise: learned.noise(name)?.clone(),
+            signature: signatures.find(|one| one.fault == fault.name)?.clone(),
+        })
+    }
+
+    /// What the last turns of its wheel say.
+    fn log_ratio(&self, orders: &[WheelOrders]) -> Option<f64> {
+        self.signature.log_ratio(&self.noise, self.wheel, orders)
+    }
+}
+
+/// What labelled runs taught of all faults.
+#[derive(Debug, Clone, Copy)]
+pub struct Taught<'a> {
+    /// How they show in the last seconds.
+    pub signatures: &'a Signatures,
+    /// How they come back with the turns of a wheel.
+    pub turning: &'a TurningSignatures,
+}
+
+impl Declared {
+    /// True if labelled runs taught how it shows.
+    const fn is_taught(&self) -> bool {
+        self.signature.is_some() || self.turning.is_some()
+    }
 }
 
 /// All of a robot's.
@@ -28,15 +78,16 @@ pub struct DeclaredFaults {
 
 impl DeclaredFaults {
     /// Those of `robot` over the channels in use, whose law is that of windows that begin with each
-    /// block. Signatures need all channels.
+    /// block; nothing is taught of a part of the channels.
     #[must_use]
     pub fn new(
         robot: &Description,
         used: &[Target],
         laws: &[Law],
-        signatures: Option<&Signatures>,
+        taught: Option<Taught<'_>>,
     ) -> Self {
-        let signatures = signatures.cloned().unwrap_or_default();
+        let signatures = taught.map(|taught| taught.signatures.clone());
+        let signatures = signatures.unwrap_or_default();
         let place = |name: &String| used.iter().position(|target| target.name == *name);
         let declared = robot.fault.iter().map(|fault| {
             let shown: Option<Vec<usize>> = fault.shows.iter().map(place).collect();
@@ -47,6 +98,7 @@ impl DeclaredFaults {
             Declared {
                 shifts: shifts.unwrap_or_default(),
                 signature: learned.find(|one| one.fault == fault.name).cloned(),
+                turning: taught.and_then(|taught| Turning::new(robot, fault, taught.turning)),
                 evidence: Evidence::default(),
             }
         });
@@ -73,13 +125,30 @@ impl DeclaredFaults {
     #[must_use]
     pub fn is_seen(&self, fault: usize) -> bool {
         let declared = &self.all[fault];
-        declared.signature.is_some() || !declared.shifts.is_empty()
+        declared.is_taught() || !declared.shifts.is_empty()
     }
 
-    /// Forgets the record.
+    /// Forgets the record: not what the turns of the wheels said, as these go on.
     pub fn clear(&mut self) {
+        for declared in self.all.iter_mut().filter(|one| one.turning.is_none()) {
+            declared.evidence = Evidence::default();
+        }
+    }
+
+    /// Forgets the run.
+    pub fn reset(&mut self) {
         for declared in &mut self.all {
             declared.evidence = Evidence::default();
+        }
+    }
+
+    /// Takes what the last turns of the wheels say; the last ones were those of `dt_s` ago.
+    pub fn take_orders(&mut self, orders: &[WheelOrders], dt_s: f64) {
+        for declared in &mut self.all {
+            let turning = declared.turning.as_ref();
+            if let Some(log_ratio) = turning.and_then(|turning| turning.log_ratio(orders)) {
+                declared.evidence.take(log_ratio, dt_s);
+            }
         }
     }
 
@@ -96,12 +165,36 @@ impl DeclaredFaults {
         }
     }
 
-    /// Evidence of a fault's signature, nats; none if it has none.
+    /// Evidence of what labelled runs taught of a fault, nats; none if they taught nothing.
     #[must_use]
     pub fn evidence(&self, fault: usize) -> Option<f64> {
         let declared = &self.all[fault];
-        let signature = declared.signature.as_ref();
-        signature.map(|_| declared.evidence.log_ratio())
+        declared.is_taught().then(|| declared.evidence.log_ratio())
+    }
+
+    /// True if a fault comes back with the turns of a wheel.
+    #[must_use]
+    pub fn is_turning(&self, fault: usize) -> bool {
+        self.all[fault].turning.is_some()
+    }
+
+    /// The two faults of different wheels that come back with their turns and for which most speaks,
+    /// and what speaks for the weaker one, nats; none if there is only one.
+    #[must_use]
+    pub fn pair(&self) -> Option<([usize; 2], f64)> {
+        let of = |i: usize| {
+            let wheel = self.all[i].turning.as_ref()?.wheel;
+            let log_ratio = self.all[i].evidence.log_ratio();
+            (log_ratio > 0.0).then_some((i, wheel, log_ratio))
+        };
+        let likeliest = |apart_from: Option<usize>| {
+            let all = (0..self.all.len()).filter_map(of);
+            let others = all.filter(|(_, wheel, _)| Some(*wheel) != apart_from);
+            others.max_by(|a, b| a.2.total_cmp(&b.2))
+        };
+        let (first, wheel, _) = likeliest(None)?;
+        let (second, _, log_ratio) = likeliest(Some(wheel))?;
+        Some(([first, second], log_ratio))
     }
 
     /// The law of a shift of a fault's channels in windows whose whole blocks begin with `begin`;

@@ -40,6 +40,8 @@ pub enum FaultKind {
     Shift,
     /// A declared fault shows as in the labelled runs.
     Signature,
+    /// A declared fault comes back with the turns of its wheel as in the labelled runs.
+    Turning,
 }
 
 /// Kinds of a sensor's faults.
@@ -64,7 +66,8 @@ pub const DRIVE_KINDS: [FaultKind; 5] = [
 ];
 
 /// Kinds of evidence for a declared fault.
-pub const DECLARED_KINDS: [FaultKind; 2] = [FaultKind::Shift, FaultKind::Signature];
+pub const DECLARED_KINDS: [FaultKind; 3] =
+    [FaultKind::Shift, FaultKind::Signature, FaultKind::Turning];
 
 /// Deviation of a gain from one, before anything is seen.
 pub const GAIN_SD: f64 = 1.0;
@@ -104,7 +107,7 @@ impl FaultKind {
             (Self::Loss, _) => SizeKind::EffectShareLost,
             (Self::Slip, _) => SizeKind::GripShareLost,
             (Self::Offset, _) => SizeKind::SpeedShareAdded,
-            (Self::Shift | Self::Signature, _) => SizeKind::None,
+            (Self::Shift | Self::Signature | Self::Turning, _) => SizeKind::None,
         }
     }
 }

@@ -71,6 +71,9 @@ impl fmt::Display for Identity {
             if !fault.shows.is_empty() {
                 write!(f, " (shows in {})", fault.shows.join(" "))?;
             }
+            if let Some(wheel) = &fault.wheel {
+                write!(f, " (turns with {wheel})")?;
+            }
         }
         Ok(())
     }

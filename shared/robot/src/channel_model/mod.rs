@@ -16,6 +16,7 @@
 //! | [`fault_kind`] | the ways in which a component fails |
 //! | [`shift`] | a change of several channels, each by an amount of its own |
 //! | [`signature`] | what labelled runs showed of a declared fault |
+//! | [`orders`], [`turning`] | what channels show in step with the turns of a wheel, and what labelled runs showed of it |
 //! | [`declared_faults`] | the faults that a description declares, weighed |
 //! | [`bank`] | all faults, weighed |
 //! | [`monitor`] | detection, and what is believed of each component |
@@ -45,10 +46,12 @@ pub mod law;
 pub mod model;
 pub mod monitor;
 pub mod observation;
+pub mod orders;
 pub mod scatter;
 pub mod shift;
 pub mod signature;
 pub mod tree;
+pub mod turning;
 pub mod window;
 
 pub use channel::{Channel, Regressor, Scales, Term};
@@ -57,3 +60,4 @@ pub use coverage::{Combinations, Range};
 pub use model::Model;
 pub use monitor::Monitor;
 pub use observation::{History, Observation, Observer};
+pub use orders::WheelOrders;

@@ -10,6 +10,7 @@ use super::law::{Direction, Law};
 use super::observation::{DEPTH, History, SMOOTHING_S};
 use super::scatter::{Scatter, ScatterLaw};
 use super::signature::Signatures;
+use super::turning::TurningSignatures;
 use super::{AXES, CHANNELS_MAX, DRIVES_MAX};
 use crate::alarm::AlarmError;
 use crate::description::{Description, INTERVAL_MAX_S, INTERVAL_MIN_S};
@@ -59,13 +60,16 @@ pub enum Class {
     Shift,
     /// A declared fault, by its labelled runs.
     Signature,
+    /// A declared fault, by the turns of its wheel. Its law needs no tail: the noise is measured in
+    /// the same turns.
+    Turning,
     /// What no single fault explains.
     Unknown,
 }
 
 impl Class {
     /// Every class.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Steady,
         Self::Still,
         Self::Late,
@@ -74,6 +78,7 @@ impl Class {
         Self::Noise,
         Self::Shift,
         Self::Signature,
+        Self::Turning,
         Self::Unknown,
     ];
 
@@ -92,6 +97,7 @@ impl Class {
             FaultKind::Noise | FaultKind::Rough => Some(Self::Noise),
             FaultKind::Shift => Some(Self::Shift),
             FaultKind::Signature => Some(Self::Signature),
+            FaultKind::Turning => Some(Self::Turning),
         }
     }
 }
@@ -164,6 +170,9 @@ pub struct Model {
     /// How they showed in labelled runs.
     #[serde(default, skip_serializing_if = "Signatures::is_empty")]
     pub signatures: Signatures,
+    /// How they came back in them with the turns of a wheel.
+    #[serde(default, skip_serializing_if = "TurningSignatures::is_empty")]
+    pub turning: TurningSignatures,
     /// Tails of the classes of faults.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tail: Vec<Tail>,
@@ -351,14 +360,16 @@ impl ModelFile for Model {
                            for each channel, and deviations from 1e-3";
             return refuse("signatures", found, allowed);
         }
-        for (i, one) in self.signatures.fault.iter().enumerate() {
-            let is_declared = self.declared.iter().any(|fault| fault.name == one.fault);
-            let mut before = self.signatures.fault[..i].iter();
-            if !is_declared || before.any(|other| other.fault == one.fault) {
-                let key = format!("signatures.fault.{i}.fault");
-                return refuse(key, &one.fault, "each declared fault once");
-            }
+        if !self.turning.fits(count) {
+            let found = format!("{} faults", self.turning.fault.len());
+            let allowed = "at most 8 faults and 8 wheels, each with five numbers for each channel: \
+                           amplitudes up to 1e6, squares of 0 to 1e18";
+            return refuse("turning", found, allowed);
         }
+        let names = self.signatures.fault.iter().map(|one| one.fault.as_str());
+        self.check_names("signatures", names.collect())?;
+        let names = self.turning.fault.iter().map(|one| one.fault.as_str());
+        self.check_names("turning", names.collect())?;
         self.tail.iter().try_for_each(check_tail)?;
         self.calibration.iter().try_for_each(check_calibration)
     }
@@ -366,6 +377,23 @@ impl ModelFile for Model {
 
 fn is_zero(value: &f64) -> bool {
     *value == 0.0
+}
+
+impl Model {
+    /// Checks that each of these names is one declared fault's.
+    fn check_names(&self, key: &str, names: Vec<&str>) -> Result<(), ModelError> {
+        let is_wrong = |&i: &usize| {
+            let declared = self.declared.iter().any(|fault| fault.name == names[i]);
+            !declared || names[..i].contains(&names[i])
+        };
+        match (0..names.len()).find(is_wrong) {
+            None => Ok(()),
+            Some(i) => {
+                let key = format!("{key}.fault.{i}.fault");
+                refuse(key, names[i], "each declared fault once")
+            }
+        }
+    }
 }
 
 /// Checks the numbers of a channel; `axes`: how many there are.

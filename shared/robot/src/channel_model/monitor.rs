@@ -15,12 +15,13 @@ use super::bank::{Bank, ChannelPlace, DrivePlace, IMPOSSIBLE, KINDS_MAX, Laws, W
 use super::channel::{Channel, Scales, commands, lags};
 use super::component::{Places, Quantity, Target, components, drives, targets};
 use super::coverage::{Combinations, Range, widening};
-use super::declared_faults::DeclaredFaults;
+use super::declared_faults::{DeclaredFaults, Taught};
 use super::directions::{covariances, directions};
 use super::fault_kind::{DECLARED_KINDS, DRIVE_KINDS, FaultKind, SENSOR_KINDS};
 use super::law::{BLOCK_S, BLOCKS, Law};
 use super::model::{Class, FAULT_RATE_1_H, Model, Tail};
 use super::observation::History;
+use super::orders::WheelOrders;
 use super::scatter::ScatterLaw;
 use super::window::Window;
 use super::{CHANNELS_MAX, COMPONENTS_MAX};
@@ -36,6 +37,8 @@ const BLOCKS_MIN: usize = 2;
 const READY_S: f64 = 1.0;
 /// How much more frequent a fault with labelled runs is than any other. Chosen.
 const RECORDED: f64 = 10.0;
+/// By how much rarer two faults are, each of a wheel of its own, than one, nats. Chosen.
+const ANOTHER: f64 = 4.0;
 /// Log-odds of a component from which on it may be broken.
 const SUSPECT_LOG_ODDS: f64 = -2.0;
 
@@ -64,6 +67,20 @@ const NO_BELIEF: ComponentBelief = ComponentBelief {
     size_sd: 0.0,
     age_s: 0.0,
 };
+
+/// Two faults at once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairBelief {
+    /// Probability that it is both, given that something is wrong.
+    pub p: f64,
+    /// Their components.
+    pub components: [usize; 2],
+}
+
+/// Log-odds of each component, then of the two faults at once for which most speaks.
+type Odds = [f64; COMPONENTS_MAX + 1];
+/// The same by class.
+type ClassOdds = [[f64; Class::ALL.len()]; COMPONENTS_MAX + 1];
 
 /// What a component is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,6 +143,7 @@ pub struct Monitor {
     suspects: u64,
     classes: [f64; Class::ALL.len()],
     beliefs: [ComponentBelief; COMPONENTS_MAX],
+    pair: Option<PairBelief>,
     report: DetectionOutput,
 }
 
@@ -160,8 +178,11 @@ impl Monitor {
         let driven = driven.collect();
         let laws = laws(model, &places)?;
         let targets: Vec<Target> = sensed.iter().map(|one| one.target.clone()).collect();
-        let signatures = (places.len() == all.len()).then_some(&model.signatures);
-        let declared = DeclaredFaults::new(robot, &targets, &laws.mean, signatures);
+        let taught = (places.len() == all.len()).then_some(Taught {
+            signatures: &model.signatures,
+            turning: &model.turning,
+        });
+        let declared = DeclaredFaults::new(robot, &targets, &laws.mean, taught);
         let watched = watched(at, &sensed, &declared);
         let tail = |class: Class| model.tail(channels, class).cloned();
         let window = Window::new(used, scales, model.interval_s);
@@ -179,6 +200,7 @@ impl Monitor {
             suspects: 0,
             classes: [IMPOSSIBLE; Class::ALL.len()],
             beliefs: [NO_BELIEF; COMPONENTS_MAX],
+            pair: None,
             report: DetectionOutput {
                 log_odds: IMPOSSIBLE,
                 channels: [IMPOSSIBLE; SLOTS],
@@ -217,6 +239,12 @@ impl Monitor {
         &self.beliefs[..self.watched.len()]
     }
 
+    /// What is believed of two faults at once; of each alone say [`Self::beliefs`].
+    #[must_use]
+    pub const fn pair(&self) -> Option<PairBelief> {
+        self.pair
+    }
+
     /// Log-odds of each class of faults at [`FAULT_RATE_1_H`], not tempered.
     #[must_use]
     pub const fn classes(&self) -> [f64; Class::ALL.len()] {
@@ -229,9 +257,10 @@ impl Monitor {
         &self.bank
     }
 
-    /// Takes the newest observation of `history`.
-    pub fn step(&mut self, history: &History) {
+    /// Takes the newest observation of `history`, and what the wheels show up to its end.
+    pub fn step(&mut self, history: &History, orders: &[WheelOrders]) {
         let Some(now) = history.ago(0) else { return };
+        self.bank.take_orders(orders, now.dt_s);
         // Before, nobody knows what was commanded.
         let is_known = now.moving || self.knows_rest;
         if history.ago(self.lags).is_none() || !is_known {
@@ -256,8 +285,8 @@ impl Monitor {
         let seen = self.watched.iter().filter(|watched| watched.is_seen);
         let prior = component_prior(seen.count());
         // Log-odds by component and class, before and after tempering.
-        let mut raw = [[IMPOSSIBLE; Class::ALL.len()]; COMPONENTS_MAX];
-        let mut certain = [IMPOSSIBLE; COMPONENTS_MAX];
+        let mut raw: ClassOdds = [[IMPOSSIBLE; Class::ALL.len()]; COMPONENTS_MAX + 1];
+        let mut certain: Odds = [IMPOSSIBLE; COMPONENTS_MAX + 1];
         for (i, watched) in self.watched.iter().enumerate() {
             for (k, found) in self.bank.weighed(i).iter().enumerate() {
                 let Some(kind) = watched.part.kind(k) else {
@@ -273,12 +302,17 @@ impl Monitor {
                 }
             }
         }
-        let n = self.watched.len();
+        let n = self.watched.len() + 1;
+        let turning = Class::Turning as usize;
+        let recorded = [Class::Signature as usize, turning];
+        if let Some(([first, _], further)) = self.pair_components() {
+            raw[n - 1][turning] = raw[first][turning] + further - ANOTHER;
+        }
         let unknown = prior + self.bank.unknown();
         let mut odds = certain;
         let mut odds_unknown = IMPOSSIBLE;
         for (class, tail) in self.tails.iter().enumerate() {
-            let mut all = [IMPOSSIBLE; COMPONENTS_MAX];
+            let mut all: Odds = [IMPOSSIBLE; COMPONENTS_MAX + 1];
             for (slot, raw) in all.iter_mut().zip(&raw[..n]) {
                 *slot = raw[class];
             }
@@ -299,7 +333,7 @@ impl Monitor {
                 .as_ref()
                 .map_or((total, 1.0), |tail| (tail.tempered(total), tail.slope));
             // A fault of which there are recordings does occur.
-            let tempered = match class == Class::Signature as usize {
+            let tempered = match recorded.contains(&class) {
                 true => tempered + RECORDED.ln(),
                 false => tempered,
             };
@@ -316,16 +350,20 @@ impl Monitor {
         self.report_odds(&odds, odds_unknown);
     }
 
+    /// Components of the two faults for which [`DeclaredFaults::pair`] speaks, and how much.
+    fn pair_components(&self) -> Option<([usize; 2], f64)> {
+        let first = self.watched.len() - self.bank.declared().len();
+        let (faults, further) = self.bank.declared().pair()?;
+        Some((faults.map(|fault| first + fault), further))
+    }
+
     /// Divides what speaks for the declared faults among them by all that is known of each: how
     /// rarely a class says so much without a fault is no measure of which one it is.
-    fn divide_declared(
-        &self,
-        raw: &[[f64; Class::ALL.len()]; COMPONENTS_MAX],
-        odds: &mut [f64; COMPONENTS_MAX],
-    ) {
-        let n = self.watched.len();
-        let first = n - self.bank.declared().len();
-        let classes = [Class::Shift as usize, Class::Signature as usize];
+    fn divide_declared(&self, raw: &ClassOdds, odds: &mut Odds) {
+        // The last place is that of two of them.
+        let n = self.watched.len() + 1;
+        let first = n - 1 - self.bank.declared().len();
+        let classes = [Class::Shift, Class::Signature, Class::Turning].map(|class| class as usize);
         let tails = classes
             .iter()
             .filter_map(|&class| self.tails[class].as_ref());
@@ -338,7 +376,7 @@ impl Monitor {
             1.0
         };
         let total = log_sum_exp(&odds[first..n]);
-        let mut shares = [IMPOSSIBLE; DECLARED_MAX];
+        let mut shares = [IMPOSSIBLE; DECLARED_MAX + 1];
         for (share, raw) in shares.iter_mut().zip(&raw[first..n]) {
             *share = slope * log_sum_exp(&classes.map(|class| raw[class]));
         }
@@ -348,10 +386,10 @@ impl Monitor {
         }
     }
 
-    fn report_odds(&mut self, odds: &[f64; COMPONENTS_MAX], unknown: f64) {
+    fn report_odds(&mut self, odds: &Odds, unknown: f64) {
         let n = self.watched.len();
         let mut channels = [IMPOSSIBLE; SLOTS];
-        channels[Slot::ANY] = unknown.max(IMPOSSIBLE);
+        channels[Slot::ANY] = log_add(unknown, odds[n]).max(IMPOSSIBLE);
         for (watched, odds) in self.watched.iter().zip(odds) {
             let slot = &mut channels[watched.slot];
             *slot = log_add(*slot, *odds).max(IMPOSSIBLE);
@@ -363,8 +401,15 @@ impl Monitor {
                 ..likeliest(self.bank.weighed(i), watched.part)
             };
         }
+        self.pair = self.pair_components().map(|(components, _)| PairBelief {
+            p: (odds[n] - total).exp().clamp(0.0, 1.0),
+            components,
+        });
         let is_suspect = |i: usize| odds[i] > SUSPECT_LOG_ODDS;
-        let shared = (0..n).any(|i| self.watched[i].part.quantity().is_none() && is_suspect(i));
+        let shared = (0..=n).any(|i| {
+            let part = self.watched.get(i).map(|watched| watched.part);
+            part.and_then(Part::quantity).is_none() && is_suspect(i)
+        });
         let channels_of = self.bank.components().enumerate();
         self.suspects = channels_of
             .filter(|&(_, component)| shared || unknown > SUSPECT_LOG_ODDS || is_suspect(component))

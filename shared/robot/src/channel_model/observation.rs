@@ -4,6 +4,7 @@ use vigil_blocks::{CHANNELS, SensorFrame};
 use vigil_inference::angle::wrap;
 
 use super::component::{Quantity, Target, targets};
+use super::orders::{MEMORIES_TURNS, OrderTracker, WheelOrders};
 use super::{AXES, CHANNELS_MAX};
 use crate::channel_map::ChannelMap;
 use crate::description::Description;
@@ -146,6 +147,19 @@ fn within(value: f64, period: Option<f64>) -> f64 {
     period.map_or(value, |period| value - period * (value / period).round())
 }
 
+/// The wheels with whose turns a declared fault comes back: place of the rate, and wheel.
+fn turning(robot: &Description, targets: &[Target]) -> Vec<(usize, usize)> {
+    let is_named = |wheel: usize| {
+        let name = robot.wheels.get(wheel).map(|wheel| &wheel.name);
+        let mut named = robot.fault.iter().filter_map(|fault| fault.wheel.as_ref());
+        named.any(|named| Some(named) == name)
+    };
+    let rates = targets.iter().enumerate();
+    let rates = rates.filter(|(_, target)| target.quantity == Quantity::WheelRate);
+    let wheels = rates.filter_map(|(place, target)| Some((place, target.wheel?)));
+    wheels.filter(|&(_, wheel)| is_named(wheel)).collect()
+}
+
 /// Builds observations from frames.
 #[derive(Debug, Clone)]
 pub struct Observer {
@@ -162,6 +176,11 @@ pub struct Observer {
     elapsed_s: f64,
     command: [Mean; AXES],
     means: [Mean; CHANNELS_MAX],
+    /// The readings of the last frame.
+    readings: [Option<f64>; CHANNELS_MAX],
+    /// The wheels with whose turns a declared fault comes back, and what was found of them.
+    trackers: Vec<OrderTracker>,
+    orders: Vec<WheelOrders>,
     pose: Option<[f64; 3]>,
     pose_before: Option<[f64; 3]>,
     /// Frames in a row that were not newer than the last one taken.
@@ -172,9 +191,17 @@ impl Observer {
     /// An observer of a robot.
     #[must_use]
     pub fn new(robot: &Description) -> Self {
+        let targets = targets(robot);
+        let (mut trackers, mut orders) = (Vec::new(), Vec::new());
+        for (place, wheel) in turning(robot, &targets) {
+            for turns in MEMORIES_TURNS {
+                trackers.push(OrderTracker::new(place, turns, targets.len()));
+                orders.push(WheelOrders::new(wheel, turns, targets.len()));
+            }
+        }
         Self {
             map: ChannelMap::new(robot),
-            targets: targets(robot),
+            targets,
             robot: robot.clone(),
             history: History::default(),
             started: false,
@@ -185,6 +212,9 @@ impl Observer {
             elapsed_s: 0.0,
             command: [Mean::default(); AXES],
             means: [Mean::default(); CHANNELS_MAX],
+            readings: [None; CHANNELS_MAX],
+            trackers,
+            orders,
             pose: None,
             pose_before: None,
             stale: 0,
@@ -195,6 +225,13 @@ impl Observer {
     #[must_use]
     pub const fn history(&self) -> &History {
         &self.history
+    }
+
+    /// What the last turns show of each wheel with which a declared fault comes back, at the end of
+    /// the newest observation: with each of [`MEMORIES_TURNS`].
+    #[must_use]
+    pub fn orders(&self) -> &[WheelOrders] {
+        &self.orders
     }
 
     /// Forgets everything: the next frame begins a new run.
@@ -228,6 +265,7 @@ impl Observer {
         if broken {
             self.history.clear();
             self.clear();
+            self.trackers.iter_mut().for_each(OrderTracker::clear);
         }
         if broken || frame.pose_reset_count != self.reset_count {
             (self.pose, self.pose_before) = (None, None);
@@ -246,6 +284,9 @@ impl Observer {
             };
         }
         self.elapsed_s += dt_s;
+        for tracker in &mut self.trackers {
+            tracker.take(dt_s, &self.readings);
+        }
         let complete = self.elapsed_s + NEARLY * dt_s >= self.robot.interval_s;
         if complete {
             self.complete();
@@ -275,10 +316,14 @@ impl Observer {
             let largest = BEYOND_LIMITS * axis.limit;
             push(&mut self.command[i], frame.commanded(i), (largest, None));
         }
-        for (target, mean) in self.targets.iter().zip(&mut self.means) {
+        self.readings = [None; CHANNELS_MAX];
+        let slots = self.means.iter_mut().zip(&mut self.readings);
+        for (target, (mean, reading)) in self.targets.iter().zip(slots) {
             if target.place < CHANNELS {
                 let value = frame.measured(target.place);
                 push(mean, value, (target.largest, target.period));
+                let sane = value.filter(|value| value.abs() <= target.largest);
+                *reading = sane.filter(|_| target.period.is_none());
             }
         }
         if let Some(pose) = self.map.pose(frame) {
@@ -329,6 +374,9 @@ impl Observer {
             now.steady_s = 0.0;
         }
         self.history.push(now);
+        for (tracker, found) in self.trackers.iter().zip(&mut self.orders) {
+            tracker.write(found);
+        }
     }
 
     /// Displacement along and across (left) the mean heading, m, and turn, rad.

@@ -162,6 +162,7 @@ fn wheels_without_a_command_have_no_drives() {
     let mut robot = robot("kobuki");
     robot.kinematics = Kinematics::None;
     robot.command.clear();
+    robot.fault.clear();
     assert!(drives(&robot).is_empty());
     let names: Vec<String> = components(&robot).into_iter().map(|one| one.name).collect();
     assert_eq!(
@@ -195,6 +196,11 @@ fn a_declared_fault_has_a_name_of_its_own_and_shows_in_channels_that_are_there()
     let group = made.nodes()[leaf].parent.unwrap();
     assert_eq!(made.nodes()[group].name, "LEFT");
     assert_eq!(made.nodes()[leaf].fault.as_deref(), Some("fault:tyre"));
+    let (refused, made) = declared("fault = [{ name = 'tyre', wheel = 'R' }]");
+    assert_eq!(refused, None);
+    let made = made.unwrap();
+    let group = made.nodes()[made.index("tyre").unwrap()].parent.unwrap();
+    assert_eq!(made.nodes()[group].name, "WHEEL_R");
     for (fault, said) in [
         ("fault = [{ name = 'enc_L' }]", "is taken"),
         ("fault = [{ name = 'a' }, { name = 'a' }]", "is taken"),
@@ -207,6 +213,10 @@ fn a_declared_fault_has_a_name_of_its_own_and_shows_in_channels_that_are_there()
             "'enc_L' twice",
         ),
         ("fault = [{ name = 'flat tyre' }]", "letters, digits"),
+        (
+            "fault = [{ name = 'tyre', wheel = 'LM' }]",
+            "'LM', which is no wheel whose rate",
+        ),
         (
             "fault = [{ name = 'tyre', shows = ['enc_X'] }]",
             "'enc_X', which is no channel",
@@ -442,7 +452,7 @@ fn another_prior_rate_moves_log_odds_and_threshold_by_its_logarithm() {
                 frame.set_channel(channel, [8.5, 8.5, 0.0, 0.03, 0.03][channel] + off);
             }
             if observer.push(&frame).complete {
-                monitor.step(observer.history());
+                monitor.step(observer.history(), observer.orders());
                 out.push(monitor.report().log_odds);
             }
         }

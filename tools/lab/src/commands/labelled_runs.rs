@@ -32,7 +32,8 @@ pub(super) fn labelled_runs<'a>(
             .iter()
             .map(|fault| fault.name.as_str())
             .collect();
-        if !declared.contains(&label.mode.as_str()) {
+        // Several at once teach nothing of any one of them.
+        if !label.mode.split('+').all(|mode| declared.contains(&mode)) {
             let declared = match declared[..] {
                 [] => "none".to_owned(),
                 _ => declared.join(", "),

@@ -43,16 +43,11 @@ pub struct Args {
     /// currents. Default: the healthy runs of --frames, if they hold these channels.
     #[arg(long, value_name = "F", requires = "runs")]
     more: Option<PathBuf>,
-    /// Runs to learn from: ids separated by commas. Only without labels.
-    #[arg(
-        long,
-        value_name = "LIST",
-        value_delimiter = ',',
-        conflicts_with = "runs"
-    )]
+    /// Runs to learn from: ids separated by commas. Only a model of channels.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
     only: Vec<u32>,
-    /// Learn only from the first S seconds of each run. Only without labels.
-    #[arg(long, value_name = "S", conflicts_with = "runs")]
+    /// Learn only from the first S seconds of each run. Only a model of channels.
+    #[arg(long, value_name = "S")]
     until: Option<f64>,
     /// Where to write the model (TOML).
     #[arg(long, value_name = "MODEL", required_unless_present = "show")]

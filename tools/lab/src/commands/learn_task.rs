@@ -83,7 +83,7 @@ pub(super) fn learn(
         None => Vec::new(),
     };
     let healthy = task.runs.iter().map(|run| healthy_part(run, &faulty));
-    let healthy: Vec<Run> = healthy.collect();
+    let healthy: Vec<Run> = healthy.filter(|run| !run.frames.is_empty()).collect();
     let is_learned = |label: &LabelledRun<'_>| !held_out.contains(&label.run.id);
     let labelled: Vec<LabelledRun<'_>> = faulty.into_iter().filter(is_learned).collect();
     let groups = task.labels.unwrap_or_default().iter();

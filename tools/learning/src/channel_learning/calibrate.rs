@@ -36,9 +36,10 @@ pub(super) fn fit(
             Class::Late | Class::Drive => !robot.command.is_empty(),
             _ => true,
         };
+        let recorded = [Class::Signature, Class::Turning];
         let all = Class::ALL
             .into_iter()
-            .filter(|class| *class != Class::Signature);
+            .filter(|class| !recorded.contains(class));
         let tails = tails(all.filter(is_there), &mut by_class, (channels, form));
         extend(model, models, &tails);
         if !model.signatures.is_empty() {
@@ -143,7 +144,7 @@ fn maxima<const N: usize>(
                 if std::mem::take(&mut is_new) {
                     monitor.reset();
                 }
-                monitor.step(history);
+                monitor.step(history, &record.orders[k]);
                 let Some(now) = history.ago(0).filter(|now| now.moving) else {
                     continue;
                 };

@@ -34,8 +34,8 @@ const OWN_RUNS: f64 = 3.0;
 const INDEPENDENT: f64 = 0.1;
 /// A run is found if its evidence exceeds this, nats, and the highest in health by a factor, within
 /// a time after the onset.
-const FOUND: f64 = 5.0;
-const FOUND_RATIO: f64 = 1.2;
+pub(super) const FOUND: f64 = 5.0;
+pub(super) const FOUND_RATIO: f64 = 1.2;
 const FOUND_S: f64 = 10.0;
 
 /// A run with a declared fault.
@@ -64,13 +64,18 @@ struct Sample<'a> {
 pub struct FaultFit {
     /// Name of the fault.
     pub fault: String,
+    /// Wheel with whose turns it comes back.
+    pub wheel: Option<String>,
     /// Its runs.
     pub runs: usize,
     /// Those that show some healthy seconds, and then how the fault begins.
     pub runs_with_onset: usize,
     /// Groups of these.
     pub groups: usize,
-    /// Runs that are found by a signature that has not seen their group.
+    /// Runs that were looked for: parts of them, where all are of one group and come back with the
+    /// turns of a wheel.
+    pub parts: usize,
+    /// Those found by a signature that has not seen their group.
     pub runs_found: usize,
     /// True if the model recognizes the fault by its runs.
     pub is_used: bool,
@@ -79,6 +84,30 @@ pub struct FaultFit {
 impl fmt::Display for FaultFit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (fault, runs) = (&self.fault, self.runs);
+        let used = if self.is_used {
+            "recognized"
+        } else {
+            "not recognized"
+        };
+        let parts = (self.runs_found, self.parts);
+        if let Some(wheel) = &self.wheel {
+            return match self.groups {
+                0 => write!(f, "{fault}: no run shows turns of {wheel}"),
+                1 => write!(
+                    f,
+                    "{fault}: {used} by the turns of {wheel}: {} of {} parts found by a signature of \
+                     the others. All runs are of one group: what else was special of that day is \
+                     taken for the fault, too",
+                    parts.0, parts.1
+                ),
+                _ => write!(
+                    f,
+                    "{fault}: {used} by the turns of {wheel}: {} of {} runs found by a signature that \
+                     has not seen their group",
+                    parts.0, parts.1
+                ),
+            };
+        }
         if self.runs_with_onset < runs {
             let without = runs - self.runs_with_onset;
             write!(
@@ -86,26 +115,18 @@ impl fmt::Display for FaultFit {
                 "{fault}: {without} of {runs} runs show no healthy seconds before it; "
             )?;
         }
-        let found = (self.runs_found, self.runs_with_onset);
-        match (self.groups, self.is_used) {
-            (0, _) => write!(f, "{fault}: no run shows how it begins"),
-            (1, _) => write!(
+        match self.groups {
+            0 => write!(f, "{fault}: no run shows how it begins"),
+            1 => write!(
                 f,
                 "{fault}: not recognized by its runs: all are of one group"
             ),
-            (_, is_used) => {
-                let used = if is_used {
-                    "recognized"
-                } else {
-                    "not recognized"
-                };
-                write!(
-                    f,
-                    "{fault}: {used} by its runs: {} of {} found by a signature that has not seen \
-                     their group",
-                    found.0, found.1
-                )
-            }
+            _ => write!(
+                f,
+                "{fault}: {used} by its runs: {} of {} found by a signature that has not seen \
+                 their group",
+                parts.0, parts.1
+            ),
         }
     }
 }
@@ -115,7 +136,7 @@ pub(super) fn fit(
     model: &mut Model,
     (models, records): (&[Model], &[Record]),
     (labelled, groups): (&[LabelledRun<'_>], &[(u32, String)]),
-    (robot, scales): (&Description, &Scales),
+    (robot, scales, until_s): (&Description, &Scales, f64),
 ) -> Vec<FaultFit> {
     if labelled.is_empty() {
         return Vec::new();
@@ -140,9 +161,9 @@ pub(super) fn fit(
         correlation: DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (sd[i] * sd[j])),
         runs: healthy,
     };
-    let samples = samples(model, (labelled, groups), (robot, scales));
+    let samples = samples(model, (labelled, groups), (robot, scales, until_s));
     let mut told = Vec::new();
-    for fault in &robot.fault {
+    for fault in robot.fault.iter().filter(|fault| fault.wheel.is_none()) {
         let of_fault = samples.iter().filter(|one| one.label.fault == fault.name);
         let runs: Vec<&Sample<'_>> = of_fault.collect();
         let labels = labelled.iter().filter(|label| label.fault == fault.name);
@@ -157,6 +178,8 @@ pub(super) fn fit(
         let signature = signature.filter(|_| is_enough);
         told.push(FaultFit {
             fault: fault.name.clone(),
+            wheel: None,
+            parts: runs.len(),
             runs: labels,
             runs_with_onset: runs.len(),
             groups: groups.len(),
@@ -236,7 +259,7 @@ fn vector(means: &Means, n: usize) -> DVector<f64> {
 fn samples<'a>(
     model: &Model,
     (labelled, groups): (&'a [LabelledRun<'a>], &[(u32, String)]),
-    (robot, scales): (&Description, &Scales),
+    (robot, scales, until_s): (&Description, &Scales, f64),
 ) -> Vec<Sample<'a>> {
     let n = model.channel.len();
     let used = model.channel.iter().cloned().enumerate().collect();
@@ -250,7 +273,7 @@ fn samples<'a>(
         };
         window.reset();
         let mut is_healthy_first = false;
-        let until_s = label.onset_s + FOUND_S;
+        let until_s = until_s.min(label.onset_s + FOUND_S);
         for record in record::all(&[label.run], until_s, robot) {
             for history in &record.histories {
                 let Some(now) = history.ago(0) else { continue };

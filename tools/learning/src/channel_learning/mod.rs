@@ -17,6 +17,7 @@ mod regression;
 mod report;
 mod terms;
 mod told;
+mod turning;
 mod unseen;
 mod view;
 
@@ -26,6 +27,7 @@ use vigil_robot::channel_model::channel::lags;
 use vigil_robot::channel_model::model::{KIND, VERSION};
 use vigil_robot::channel_model::scatter::Scatter;
 use vigil_robot::channel_model::signature::Signatures;
+use vigil_robot::channel_model::turning::TurningSignatures;
 use vigil_robot::channel_model::{
     Channel, Combinations, Model, Range, Scales, Target, Term, drives, targets,
 };
@@ -204,10 +206,14 @@ pub fn learn(log: &Log<'_>, robot: &Description) -> Result<(Model, Report), LogE
         &mut model,
         (&models, &records),
         (log.labelled, log.groups),
-        (robot, &scales),
+        (robot, &scales, until_s),
     );
+    let labelled = (log.labelled, log.groups);
+    let turning = turning::fit(&mut model, &records, labelled, (robot, until_s));
+    report.faults.extend(turning);
     for part in &mut models {
         part.signatures.clone_from(&model.signatures);
+        part.turning.clone_from(&model.turning);
     }
     calibrate::fit(&mut model, &mut models, &records, robot);
     calibrate::tell(&mut report.bounds, &model);
@@ -286,6 +292,7 @@ fn blank(
         scatter: Scatter::default(),
         declared: robot.fault.clone(),
         signatures: Signatures::default(),
+        turning: TurningSignatures::default(),
         tail: Vec::new(),
         calibration: Vec::new(),
     }

@@ -3,7 +3,7 @@
 
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
-use vigil_robot::channel_model::{History, Observation, Observer};
+use vigil_robot::channel_model::{History, Observation, Observer, WheelOrders};
 
 /// Parts into which a log is divided: each is judged by what was learned from the others.
 pub(super) const FOLDS: usize = 5;
@@ -15,6 +15,8 @@ const PIECES: usize = 2 * FOLDS;
 pub(super) struct Record {
     /// After each observation: it and those before it.
     pub histories: Vec<History>,
+    /// After each observation: what the wheels show with whose turns a declared fault comes back.
+    pub orders: Vec<Vec<WheelOrders>>,
     /// The part that each belongs to.
     pub folds: Vec<usize>,
 }
@@ -96,13 +98,14 @@ pub(super) fn grouped(
     }
     let record = |(run, i): (&&Run, usize)| {
         let mut observer = Observer::new(robot);
-        let mut histories = Vec::new();
+        let (mut histories, mut orders) = (Vec::new(), Vec::new());
         for frame in &run.frames {
             if frame.header.t_capture_ns as f64 * 1e-9 > until_s {
                 break;
             }
             if observer.push(frame).complete {
                 histories.push(*observer.history());
+                orders.push(observer.orders().to_vec());
             }
         }
         let length = histories.len().div_ceil(PIECES).max(1);
@@ -113,6 +116,7 @@ pub(super) fn grouped(
         Record {
             folds: (0..histories.len()).map(fold).collect(),
             histories,
+            orders,
         }
     };
     runs.iter().zip(places).map(record).collect()

@@ -69,10 +69,14 @@ impl View {
             learned: channel.clone(),
         };
         let signatures = model.signatures.fault.iter();
-        let signatures = signatures.map(|one| RecognizedFault {
-            fault: one.fault.clone(),
-            runs: one.runs,
-        });
+        let signatures = signatures.map(|one| (&one.fault, one.runs));
+        let turning = model.turning.fault.iter().map(|one| (&one.fault, one.runs));
+        let signatures = signatures
+            .chain(turning)
+            .map(|(fault, runs)| RecognizedFault {
+                fault: fault.clone(),
+                runs,
+            });
         Self {
             source,
             interval_s: model.interval_s,

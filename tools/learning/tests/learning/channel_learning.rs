@@ -86,7 +86,7 @@ fn first_alarm(model: &Model, robot: &Description, run: &Run) -> Option<(f64, St
     let mut observer = Observer::new(robot);
     for frame in &run.frames {
         if observer.push(frame).complete {
-            monitor.step(observer.history());
+            monitor.step(observer.history(), observer.orders());
             if monitor.is_ready() && monitor.report().log_odds > threshold {
                 let parts = components(robot);
                 let beliefs = monitor.beliefs().iter().zip(&parts);

@@ -98,7 +98,7 @@ fn alarm(model: &Model, robot: &Description, run: &Run) -> Option<(f64, usize)> 
         if !observer.push(frame).complete {
             continue;
         }
-        monitor.step(observer.history());
+        monitor.step(observer.history(), observer.orders());
         let report = monitor.report();
         if monitor.is_ready() && report.log_odds > threshold {
             let channels = report.channels.iter().enumerate();
@@ -149,7 +149,7 @@ fn what_has_ended_is_forgotten_within_seconds() {
     let mut at = Vec::new();
     for frame in &run(1, 24.0, told, |_| [0.4, 0.1]).frames {
         if observer.push(frame).complete {
-            monitor.step(observer.history());
+            monitor.step(observer.history(), observer.orders());
             at.push(monitor.report().log_odds);
         }
     }

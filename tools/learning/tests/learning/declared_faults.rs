@@ -132,7 +132,7 @@ fn found(model: &Model, robot: &Description, run: &Run) -> Option<(f64, String)>
         if !observer.push(frame).complete {
             continue;
         }
-        monitor.step(observer.history());
+        monitor.step(observer.history(), observer.orders());
         let t_s = frame.header.t_capture_ns as f64 * 1e-9;
         if monitor.is_ready() && monitor.report().log_odds > threshold {
             alarm_s = alarm_s.or(Some(t_s));
@@ -199,7 +199,7 @@ fn usual_p_fault(model: &Model, robot: &Description) -> f64 {
     let mut found = Vec::new();
     for frame in &run(90, 200.0, 0.0, NOTHING).frames {
         if observer.push(frame).complete {
-            monitor.step(observer.history());
+            monitor.step(observer.history(), observer.orders());
             found.push(1.0 / (1.0 + (-monitor.report().log_odds).exp()));
         }
     }

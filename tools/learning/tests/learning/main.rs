@@ -10,3 +10,4 @@ mod learning;
 mod refusals;
 mod rover;
 mod small;
+mod turning_faults;

@@ -1,0 +1,196 @@
+//! Declared faults that come back with the turns of a wheel.
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+use vigil_blocks::SensorFrame;
+use vigil_learning::channel_learning::{LabelledRun, Log, Report, learn};
+use vigil_recording::frames::Run;
+use vigil_robot::Description;
+use vigil_robot::channel_model::{Model, Monitor, Observer, components};
+use vigil_robot::learned::Form;
+use vigil_robot::learned::channels::Channels;
+
+use super::small::small;
+
+const RATE_HZ: f64 = 50.0;
+/// Deviation of the noise: of a wheel's rate, rad/s, and of a current, A.
+const NOISE: [f64; 2] = [0.1, 0.02];
+
+fn robot() -> Description {
+    small(
+        "measured = { pose = false, wheel_rates = true, steer = false, currents = true }\n\
+         polynomial_order = 1\n\
+         fault = [{ name = 'LEFT', wheel = 'L' }, { name = 'RIGHT', wheel = 'R' }]",
+    )
+}
+
+/// A run in which the tyres are flat from `onset_s` on: by so much of the noise.
+fn run(id: u32, length_s: f64, flat: [f64; 2], onset_s: f64) -> Run {
+    let mut rng = Pcg64Mcg::seed_from_u64(u64::from(id));
+    let mut angles = [0.0, 0.0].map(|_: f64| rng.random_range(0.0..6.0));
+    let mut frames = Vec::new();
+    for i in 0..(length_s * RATE_HZ) as u64 {
+        let t_s = i as f64 / RATE_HZ;
+        let step = (t_s / 4.0) as u64;
+        let at = |of: u64| (step * of % 11) as f64 / 10.0;
+        let [v, w] = match step % 8 {
+            7 => [0.0, 0.0],
+            _ => [0.3 + 0.4 * at(3), 0.8 * at(7) - 0.4],
+        };
+        let mut frame = SensorFrame::default();
+        frame.header.t_capture_ns = (t_s * 1e9) as u64;
+        (frame.header.seq, frame.run_id) = (i, u64::from(id) + 1);
+        frame.set_command(0, v);
+        frame.set_command(1, w);
+        for wheel in 0..2 {
+            let side = [0.1, -0.1][wheel];
+            let told = (v - side * w) / 0.1;
+            let size = if t_s >= onset_s { flat[wheel] } else { 0.0 };
+            let angle: f64 = angles[wheel];
+            let noise = NOISE.map(|sd| sd * rng.sample::<f64, _>(StandardNormal));
+            let shakes = size * NOISE[0] * ((2.0 * angle).cos() + 0.5 * (angle + 1.0).sin());
+            let draws = size * NOISE[1] * (angle - 0.5).cos();
+            let turns = f64::from(told != 0.0);
+            let rate = told + turns * shakes;
+            angles[wheel] += rate / RATE_HZ;
+            frame.set_channel(wheel, rate + noise[0]);
+            frame.set_channel(2 + wheel, 0.3 + turns * draws + noise[1]);
+        }
+        frames.push(frame);
+    }
+    Run { id, frames }
+}
+
+/// A model of ten healthy minutes and of these runs, all flat from their beginning.
+fn learned(robot: &Description, flat: &[(Run, &str)]) -> (Model, Report) {
+    let healthy = [run(0, 600.0, [0.0; 2], 0.0)];
+    let label = |(run, fault): &'_ (Run, &'_ str)| (run.clone(), (*fault).to_owned());
+    let owned: Vec<(Run, String)> = flat.iter().map(label).collect();
+    let labelled: Vec<LabelledRun<'_>> = owned
+        .iter()
+        .map(|(run, fault)| LabelledRun {
+            run,
+            fault,
+            onset_s: 0.0,
+        })
+        .collect();
+    let log = Log {
+        labelled: &labelled,
+        ..Log::of_healthy(&healthy)
+    };
+    learn(&log, robot).unwrap()
+}
+
+fn usual_runs() -> Vec<(Run, &'static str)> {
+    let left = (1..4).map(|id| (run(id, 60.0, [1.0, 0.0], 0.0), "LEFT"));
+    let right = (4..7).map(|id| (run(id, 60.0, [0.0, 1.0], 0.0), "RIGHT"));
+    left.chain(right).collect()
+}
+
+/// First alarm of 24 h between false ones, s, and what was believed at the end: the probability of
+/// each of the two, and that of both.
+fn found(model: &Model, robot: &Description, run: &Run) -> (Option<f64>, [f64; 2], f64) {
+    let calibration = model.calibration(Channels::PoseEncoders, Form::LearnedBias);
+    let threshold = calibration.unwrap().alarm_log_odds(24.0, 1.0);
+    let mut monitor = Monitor::new(model, robot, Channels::PoseEncoders, 1.0).unwrap();
+    let mut observer = Observer::new(robot);
+    let mut alarm_s = None;
+    for frame in &run.frames {
+        if observer.push(frame).complete {
+            monitor.step(observer.history(), observer.orders());
+            if monitor.is_ready() && monitor.report().log_odds > threshold {
+                alarm_s = alarm_s.or(Some(frame.header.t_capture_ns as f64 * 1e-9));
+            }
+        }
+    }
+    let parts = components(robot);
+    let p = |name: &str| {
+        let place = parts.iter().position(|part| part.name == name).unwrap();
+        monitor.beliefs()[place].p
+    };
+    let both = monitor.pair().map_or(0.0, |pair| pair.p);
+    (alarm_s, [p("LEFT"), p("RIGHT")], both)
+}
+
+#[test]
+fn a_flat_tyre_is_named_by_its_wheel_and_two_are_named_together() {
+    let robot = robot();
+    let (model, report) = learned(&robot, &usual_runs());
+    let fits: Vec<_> = report
+        .faults
+        .iter()
+        .map(|fit| (fit.runs_found, fit.parts))
+        .collect();
+    assert_eq!(fits, [(3, 3), (3, 3)]);
+    assert_eq!(Model::from_toml(&model.to_toml().unwrap()).unwrap(), model);
+    let onset_s = 40.0;
+    let of = |flat| found(&model, &robot, &run(50, 120.0, flat, onset_s));
+    let alarms = onset_s..onset_s + 30.0;
+    let (alarm_s, [left, right], both) = of([1.0, 0.0]);
+    assert!(
+        alarm_s.is_some_and(|t_s| alarms.contains(&t_s)),
+        "{alarm_s:?}"
+    );
+    assert!(left > 0.9, "{left} {right} {both}");
+    let (alarm_s, [left, right], both) = of([0.0, 0.8]);
+    assert!(
+        alarm_s.is_some_and(|t_s| alarms.contains(&t_s)),
+        "{alarm_s:?}"
+    );
+    assert!(right > 0.9, "{left} {right} {both}");
+    let (alarm_s, [left, right], both) = of([1.0, 1.0]);
+    assert!(
+        alarm_s.is_some_and(|t_s| alarms.contains(&t_s)),
+        "{alarm_s:?}"
+    );
+    assert!(both > 0.9, "{left} {right} {both}");
+}
+
+#[test]
+fn healthy_wheels_raise_no_alarm() {
+    let robot = robot();
+    let (model, _) = learned(&robot, &usual_runs());
+    for id in 20..23 {
+        let (alarm_s, ..) = found(&model, &robot, &run(id, 600.0, [0.0; 2], 0.0));
+        assert_eq!(alarm_s, None, "{id}");
+    }
+}
+
+#[test]
+fn a_single_run_is_cut_into_thirds_and_the_report_says_so() {
+    let robot = robot();
+    let flat = [(run(1, 120.0, [1.0, 0.0], 0.0), "LEFT")];
+    let (model, report) = learned(&robot, &flat);
+    let fit = &report.faults[0];
+    assert_eq!((fit.groups, fit.parts, fit.runs_found), (1, 3, 3));
+    assert!(fit.is_used && model.turning.fault.len() == 1);
+    let said = fit.to_string();
+    assert!(
+        said.contains("3 of 3 parts") && said.contains("of that day"),
+        "{said}"
+    );
+}
+
+#[test]
+fn runs_that_show_nothing_teach_nothing() {
+    let robot = robot();
+    let healthy = (1..4).map(|id| (run(id, 60.0, [0.0; 2], 0.0), "LEFT"));
+    let (model, report) = learned(&robot, &healthy.collect::<Vec<_>>());
+    assert!(!report.faults[0].is_used, "{}", report.faults[0]);
+    assert!(model.turning.is_empty());
+    // A run that stands has no turns.
+    let mut stands = run(9, 60.0, [1.0, 0.0], 0.0);
+    for frame in &mut stands.frames {
+        frame.set_command(0, 0.0);
+        frame.set_command(1, 0.0);
+        frame.set_channel(0, 0.0);
+        frame.set_channel(1, 0.0);
+    }
+    let (_, report) = learned(&robot, &[(stands, "LEFT")]);
+    assert!(
+        report.faults[0]
+            .to_string()
+            .contains("no run shows turns of L")
+    );
+}
