@@ -1,5 +1,5 @@
-//! Wheels of a real Kobuki with tape on them, each class judged by what was learned from other parts
-//! of the same recordings.
+//! Wheels of a real Kobuki with tape on them, each class judged by what was learned from other
+//! parts of the same recordings.
 
 use std::error::Error;
 

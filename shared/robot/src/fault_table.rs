@@ -24,8 +24,9 @@ pub struct DeclaredFault {
     #[serde(default)]
     #[schemars(length(max = SHOWN_MAX))]
     pub shows: Vec<String>,
-    /// Wheel with each turn of which it comes back, as a flat tyre or a bent axle does: labelled runs
-    /// say what channels show in the first five orders of its angle. The wheel's rate is measured.
+    /// Wheel with each turn of which it comes back, as a flat tyre or a bent axle does: labelled
+    /// runs say what channels show in the first five orders of its angle. The wheel's rate is
+    /// measured.
     #[serde(default)]
     pub wheel: Option<String>,
 }

@@ -4,7 +4,7 @@ use vigil_blocks::{
     DetectionBelief, Entry, FAULT_NODES, FaultBelief, FaultSet, MODE_UNKNOWN, ParticleBlock,
     Readiness,
 };
-use vigil_robot::channel_model::monitor::{ComponentBelief, PairBelief};
+use vigil_robot::channel_model::belief::{ComponentBelief, PairBelief};
 use vigil_robot::channel_model::{Model, Monitor, Observer, components};
 use vigil_robot::{ChannelMap, Description, FaultTree};
 

@@ -213,8 +213,8 @@ fn unfit_fault(
         && !all.iter().any(|target| target.is_rate_of(robot, wheel))
     {
         return Some(format!(
-            "fault '{name}' comes back with the turns of '{wheel}', which is no wheel whose rate is \
-             measured"
+            "fault '{name}' comes back with the turns of '{wheel}', which is no wheel whose rate \
+             is measured"
         ));
     }
     let is_unknown = |shown: &&String| all.iter().all(|target| target.name != **shown);

@@ -178,8 +178,8 @@ impl DeclaredFaults {
         self.all[fault].turning.is_some()
     }
 
-    /// The two faults of different wheels that come back with their turns and for which most speaks,
-    /// and what speaks for the weaker one, nats; none if there is only one.
+    /// The two faults of different wheels that come back with their turns and for which most
+    /// speaks, and what speaks for the weaker one, nats; none if there is only one.
     #[must_use]
     pub fn pair(&self) -> Option<([usize; 2], f64)> {
         let of = |i: usize| {

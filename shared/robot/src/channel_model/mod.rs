@@ -16,9 +16,11 @@
 //! | [`fault_kind`] | the ways in which a component fails |
 //! | [`shift`] | a change of several channels, each by an amount of its own |
 //! | [`signature`] | what labelled runs showed of a declared fault |
-//! | [`orders`], [`turning`] | what channels show in step with the turns of a wheel, and what labelled runs showed of it |
+//! | [`orders`] | what channels show in step with the turns of a wheel |
+//! | [`turning`] | what labelled runs showed of a fault that comes back with them |
 //! | [`declared_faults`] | the faults that a description declares, weighed |
 //! | [`bank`] | all faults, weighed |
+//! | [`belief`] | what is believed of components |
 //! | [`monitor`] | detection, and what is believed of each component |
 //! | [`model`] | the model file |
 //! | [`tree`] | the fault tree of a robot |
@@ -35,6 +37,7 @@ pub const DRIVES_MAX: usize = 8;
 pub const COMPONENTS_MAX: usize = CHANNELS_MAX + DRIVES_MAX + DECLARED_MAX;
 
 pub mod bank;
+pub mod belief;
 pub mod channel;
 pub mod component;
 pub mod coverage;

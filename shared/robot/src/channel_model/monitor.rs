@@ -8,10 +8,11 @@
 //! Another rate adds its logarithm afterwards. Alarms do not depend on it, as their threshold moves
 //! by as much.
 
-use vigil_blocks::{SizeKind, WHEELS};
+use vigil_blocks::WHEELS;
 use vigil_inference::logspace::{log_add, log_sum_exp};
 
 use super::bank::{Bank, ChannelPlace, DrivePlace, IMPOSSIBLE, KINDS_MAX, Laws, Weighed};
+use super::belief::{ComponentBelief, NO_BELIEF, PairBelief};
 use super::channel::{Channel, Scales, commands, lags};
 use super::component::{Places, Quantity, Target, components, drives, targets};
 use super::coverage::{Combinations, Range, widening};
@@ -41,41 +42,6 @@ const RECORDED: f64 = 10.0;
 const ANOTHER: f64 = 4.0;
 /// Log-odds of a component from which on it may be broken.
 const SUSPECT_LOG_ODDS: f64 = -2.0;
-
-/// What is believed of one component, given that something is wrong.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ComponentBelief {
-    /// Probability that it is this one.
-    pub p: f64,
-    /// Most probable kind.
-    pub kind: FaultKind,
-    /// The same with the unit of its size.
-    pub size_kind: SizeKind,
-    /// Size.
-    pub size: f64,
-    /// Deviation of the size.
-    pub size_sd: f64,
-    /// For how long it has been there at most, s.
-    pub age_s: f64,
-}
-
-const NO_BELIEF: ComponentBelief = ComponentBelief {
-    p: 0.0,
-    kind: FaultKind::Erratic,
-    size_kind: SizeKind::None,
-    size: 0.0,
-    size_sd: 0.0,
-    age_s: 0.0,
-};
-
-/// Two faults at once.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PairBelief {
-    /// Probability that it is both, given that something is wrong.
-    pub p: f64,
-    /// Their components.
-    pub components: [usize; 2],
-}
 
 /// Log-odds of each component, then of the two faults at once for which most speaks.
 type Odds = [f64; COMPONENTS_MAX + 1];

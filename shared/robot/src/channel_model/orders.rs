@@ -204,9 +204,9 @@ mod tests {
     fn what_comes_back_three_times_a_turn_is_the_third_order() {
         let found = turned(60.0, RATE_RAD_S, DT_S, |angle| 0.5 * (3.0 * angle).cos());
         let amplitude = found.amplitudes[ORDERS + 2];
-        // Of A cos(hθ) over many turns half of A is left, times the root of the number of steps that
-        // are remembered: the square of a sum of powers over the sum of their squares. The mean that
-        // is taken off passes (1 - z) / (1 - (1 - a) z), with z = e^{-ihΔθ}, twice.
+        // Of A cos(hθ) over many turns half of A is left, times the root of the number of steps
+        // that are remembered: the square of a sum of powers over the sum of their squares. The
+        // mean that is taken off passes (1 - z) / (1 - (1 - a) z), with z = e^{-ihΔθ}, twice.
         let step_rad = RATE_RAD_S * DT_S;
         let kept = (-step_rad / (TAU * MEMORIES_TURNS[0])).exp();
         let steps = (1.0 - kept * kept) / ((1.0 - kept) * (1.0 - kept));

@@ -1,6 +1,5 @@
 //! A model of channels: its file, and its joint law against a dense computation.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use nalgebra::{DMatrix, DVector};
@@ -15,7 +14,6 @@ use vigil_robot::channel_model::tree::tree;
 use vigil_robot::channel_model::{Combinations, Model, Monitor, Observer, components, drives};
 use vigil_robot::channel_table::FurtherChannel;
 use vigil_robot::description::Kinematics;
-use vigil_robot::fault_table::DeclaredFault;
 use vigil_robot::learned::Form;
 use vigil_robot::learned::channels::Channels;
 
@@ -28,7 +26,7 @@ fn shipped() -> String {
     config("models/kobuki.toml")
 }
 
-fn robot(name: &str) -> Description {
+pub fn robot(name: &str) -> Description {
     toml::from_str(&config(&format!("robots/{name}.toml"))).unwrap()
 }
 
@@ -149,6 +147,15 @@ fn numbers_that_would_blind_or_end_a_service_are_refused() {
         ),
         ("command", refused(|m| m.command[0].size = 0.0)),
         (
+            "turning",
+            refused(|m| m.turning.wheel[0].squares[0] = f64::NAN),
+        ),
+        ("turning", refused(|m| m.turning.fault[1].real.clear())),
+        (
+            "turning.fault.1.fault",
+            refused(|m| m.turning.fault[1].fault = "LEFT_TYRE".to_owned()),
+        ),
+        (
             "combinations",
             refused(|m| m.combinations.precision[0].clear()),
         ),
@@ -178,61 +185,6 @@ fn wheels_without_a_command_have_no_drives() {
     assert!(unfit(&robot).unwrap().contains("'enc_L'"));
     robot.channel = (0..24).map(|i| further(&format!("c{i}"))).collect();
     assert!(unfit(&robot).unwrap().contains("29 channels"));
-}
-
-#[test]
-fn a_declared_fault_has_a_name_of_its_own_and_shows_in_channels_that_are_there() {
-    let declared = |fault: &str| {
-        let mut robot = robot("kobuki");
-        robot.fault =
-            toml::from_str::<BTreeMap<String, Vec<DeclaredFault>>>(fault).unwrap()["fault"].clone();
-        (unfit(&robot), tree(&robot))
-    };
-    let good = "fault = [{ name = 'tyre', group = 'LEFT', shows = ['enc_L', 'current_L'] }]";
-    let (refused, made) = declared(good);
-    assert_eq!(refused, None);
-    let made = made.unwrap();
-    let leaf = made.index("tyre").unwrap();
-    let group = made.nodes()[leaf].parent.unwrap();
-    assert_eq!(made.nodes()[group].name, "LEFT");
-    assert_eq!(made.nodes()[leaf].fault.as_deref(), Some("fault:tyre"));
-    let (refused, made) = declared("fault = [{ name = 'tyre', wheel = 'R' }]");
-    assert_eq!(refused, None);
-    let made = made.unwrap();
-    let group = made.nodes()[made.index("tyre").unwrap()].parent.unwrap();
-    assert_eq!(made.nodes()[group].name, "WHEEL_R");
-    for (fault, said) in [
-        ("fault = [{ name = 'enc_L' }]", "is taken"),
-        ("fault = [{ name = 'a' }, { name = 'a' }]", "is taken"),
-        ("fault = [{ name = 'UNKNOWN' }]", "a word of Vigil's own"),
-        ("fault = [{ name = 'a', group = 'enc_L' }]", "is taken"),
-        ("fault = [{ name = 'a', group = '' }]", "'' is no name"),
-        ("fault = [{ name = 'WHEEL_L' }]", "is taken"),
-        (
-            "fault = [{ name = 'a', shows = ['enc_L', 'enc_L'] }]",
-            "'enc_L' twice",
-        ),
-        ("fault = [{ name = 'flat tyre' }]", "letters, digits"),
-        (
-            "fault = [{ name = 'tyre', wheel = 'LM' }]",
-            "'LM', which is no wheel whose rate",
-        ),
-        (
-            "fault = [{ name = 'tyre', shows = ['enc_X'] }]",
-            "'enc_X', which is no channel",
-        ),
-        (
-            "fault = [{ name = 'tyre', shows = ['enc_L', 'enc_R', 'yaw_rate', 'current_L', \
-             'current_R'] }]",
-            "5 channels: allowed are 4",
-        ),
-    ] {
-        let refused = declared(fault).0.unwrap_or_default();
-        assert!(refused.contains(said), "{fault}: {refused}");
-    }
-    let nine = (0..9).map(|i| format!("{{ name = 'f{i}' }}"));
-    let nine = format!("fault = [{}]", nine.collect::<Vec<_>>().join(", "));
-    assert!(declared(&nine).0.unwrap().contains("9 faults"));
 }
 
 /// A law of three channels, and the covariance of its window: channel by channel, then by block.

@@ -150,6 +150,21 @@ fn print_view<V: Serialize + Display>(
     Ok(Outcome::Done)
 }
 
+/// Refuses what only a model of channels can be asked for.
+fn refuse_options_of_channels(args: &Args) -> Result<(), CommandError> {
+    if args.cross_validate {
+        let refused = "--cross-validate: this robot has no model of channels; score the runs \
+                       that are left out with `vigil evaluate`";
+        return Err(CommandError::usage(refused));
+    }
+    if !args.only.is_empty() || args.until.is_some() {
+        let refused = "--only, --until: this robot has no model of channels; its runs are chosen \
+                       by their labels";
+        return Err(CommandError::usage(refused));
+    }
+    Ok(())
+}
+
 fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, CommandError> {
     check_place("--out", out)?;
     let robot = args.robot.load()?;
@@ -161,11 +176,7 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
         }
         return channels(args, frames_file, out, &robot);
     };
-    if args.cross_validate {
-        let refused = "--cross-validate: this robot has no model of channels; score the runs \
-                       that are left out with `vigil evaluate`";
-        return Err(CommandError::usage(refused));
-    }
+    refuse_options_of_channels(args)?;
     let labels = labels::read(labels_file, &robot).map_err(CommandError::usage)?;
     let runs = frames::read(frames_file, &robot).map_err(CommandError::usage)?;
     warn_slow(&runs, &labels, frames_file, &robot);

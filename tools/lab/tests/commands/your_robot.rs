@@ -81,16 +81,19 @@ fn workplace(data: &str) -> TempDir {
     folder
 }
 
-/// First alarm of every run of the verdicts, s.
-fn first_alarms(verdicts: &Path) -> BTreeMap<String, Option<f64>> {
-    let text = fs::read_to_string(verdicts).unwrap();
+/// First alarm of every run of the verdicts, s, and the mode at its end.
+fn verdicts(file: &Path) -> BTreeMap<String, (Option<f64>, String)> {
+    let text = fs::read_to_string(file).unwrap();
     let mut found = BTreeMap::new();
     for line in text.lines().skip(1) {
         let cells: Vec<&str> = line.split(',').collect();
-        let alarm = found.entry(cells[0].to_owned()).or_insert(None);
+        let (alarm, mode) = found
+            .entry(cells[0].to_owned())
+            .or_insert((None, String::new()));
         if alarm.is_none() && cells[3] == "1" {
             *alarm = Some(cells[1].parse().unwrap());
         }
+        cells[4].clone_into(mode);
     }
     found
 }
@@ -144,6 +147,10 @@ fn check_step(command: &[String], output: &Output) {
                 "a short log is told: {errors}"
             );
             check_isolability(&printed);
+            for tyre in ["LEFT_TYRE", "RIGHT_TYRE"] {
+                let said = format!("{tyre}: recognized by the turns of");
+                assert!(printed.contains(&said), "{printed}");
+            }
         }
         ("evaluate", _) => {
             let score: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -197,11 +204,20 @@ fn the_page_can_be_followed_on_the_kobukis_data() {
             check_replay(&output);
         }
     }
-    let alarms = first_alarms(&folder.path().join("verdicts.csv"));
-    assert_eq!(alarms.len(), 4);
-    assert_eq!(alarms["0"], None, "the run without a fault");
-    for run in ["1", "2", "3"] {
-        let first_s = alarms[run].unwrap_or(f64::INFINITY);
-        assert!(first_s < 80.0, "run {run}: {first_s} s");
+    let found = verdicts(&folder.path().join("verdicts.csv"));
+    assert_eq!(found.len(), 4);
+    assert_eq!(
+        found["0"],
+        (None, "ND".to_owned()),
+        "the run without a fault"
+    );
+    // The first two end where nothing was learned from; of the third nothing was.
+    for (run, name) in [("1", "LEFT_TYRE"), ("2", "RIGHT_TYRE"), ("3", "MULTIPLE")] {
+        let (alarm_s, mode) = &found[run];
+        assert!(
+            alarm_s.is_some_and(|t_s| t_s < 40.0),
+            "run {run}: {alarm_s:?}"
+        );
+        assert_eq!(mode, name, "run {run}");
     }
 }

@@ -95,15 +95,15 @@ impl fmt::Display for FaultFit {
                 0 => write!(f, "{fault}: no run shows turns of {wheel}"),
                 1 => write!(
                     f,
-                    "{fault}: {used} by the turns of {wheel}: {} of {} parts found by a signature of \
-                     the others. All runs are of one group: what else was special of that day is \
-                     taken for the fault, too",
+                    "{fault}: {used} by the turns of {wheel}: {} of {} parts found by a signature \
+                     of the others. All runs are of one group: what else was special of that \
+                     day is taken for the fault, too",
                     parts.0, parts.1
                 ),
                 _ => write!(
                     f,
-                    "{fault}: {used} by the turns of {wheel}: {} of {} runs found by a signature that \
-                     has not seen their group",
+                    "{fault}: {used} by the turns of {wheel}: {} of {} runs found by a signature \
+                     that has not seen their group",
                     parts.0, parts.1
                 ),
             };

@@ -202,19 +202,7 @@ pub fn learn(log: &Log<'_>, robot: &Description) -> Result<(Model, Report), LogE
         }
     }
     joint::fit(&mut model, &mut models, &records, &scales);
-    report.faults = labelled::fit(
-        &mut model,
-        (&models, &records),
-        (log.labelled, log.groups),
-        (robot, &scales, until_s),
-    );
-    let labelled = (log.labelled, log.groups);
-    let turning = turning::fit(&mut model, &records, labelled, (robot, until_s));
-    report.faults.extend(turning);
-    for part in &mut models {
-        part.signatures.clone_from(&model.signatures);
-        part.turning.clone_from(&model.turning);
-    }
+    report.faults = fit_declared((&mut model, &mut models), &records, log, (robot, &scales));
     calibrate::fit(&mut model, &mut models, &records, robot);
     calibrate::tell(&mut report.bounds, &model);
     let study = |interval_h| {
@@ -230,6 +218,24 @@ pub fn learn(log: &Log<'_>, robot: &Description) -> Result<(Model, Report), LogE
     report.isolability = log.isolability_at_h.and_then(study);
     report.finish(&model);
     Ok((model.sealed(), report))
+}
+
+/// Learns from labelled runs how declared faults show, for all models.
+fn fit_declared(
+    (model, models): (&mut Model, &mut [Model]),
+    records: &[Record],
+    log: &Log<'_>,
+    (robot, scales): (&Description, &Scales),
+) -> Vec<FaultFit> {
+    let labelled = (log.labelled, log.groups);
+    let used = (robot, scales, log.until_s);
+    let mut told = labelled::fit(model, (models, records), labelled, used);
+    told.extend(turning::fit(model, records, labelled, (robot, log.until_s)));
+    for part in models {
+        part.signatures.clone_from(&model.signatures);
+        part.turning.clone_from(&model.turning);
+    }
+    told
 }
 
 /// Learns which commands the log covers; with models of the parts' others.

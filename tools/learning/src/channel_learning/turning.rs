@@ -2,9 +2,9 @@
 //!
 //! How a wheel stood when a run began is not known. The runs are cut into pieces, the pieces turned
 //! until they agree, and averaged; each amplitude is lessened by as much as noise alone would leave
-//! of it. A signature is kept if it finds at least half of the fault's runs without having seen their
-//! group. All runs of one group are cut into thirds, of which two find the other: nothing tells the
-//! fault from what was special of that day, and the report says so.
+//! of it. A signature is kept if it finds at least half of the fault's runs without having seen
+//! their group. All runs of one group are cut into thirds, of which two find the other: nothing
+//! tells the fault from what was special of that day, and the report says so.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
