@@ -10,6 +10,7 @@ use super::fault_kind::{DECLARED_KINDS, FaultKind, GAIN_SD, SENSOR_KINDS, bias_s
 use super::law::{BLOCKS, Change, Law, Row};
 use super::orders::WheelOrders;
 use super::scatter::ScatterLaw;
+use super::signature::Terms;
 use super::window::{DELAY_BLOCKS, Window};
 use super::{CHANNELS_MAX, COMPONENTS_MAX};
 
@@ -223,8 +224,8 @@ impl Bank {
     }
 
     /// Weighs all faults; `measured`: what of the channels the newest observation holds, which
-    /// lasted `dt_s`. False if the window is too short yet to say anything.
-    pub fn weigh(&mut self, measured: impl Fn(usize) -> bool, dt_s: f64) -> bool {
+    /// lasted `dt_s`; `terms`: of the command. False if the window is too short yet to say anything.
+    pub fn weigh(&mut self, measured: impl Fn(usize) -> bool, terms: Terms, dt_s: f64) -> bool {
         let n = self.channels.len();
         self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
         (self.unknown, self.unknown_noise) = (IMPOSSIBLE, IMPOSSIBLE);
@@ -246,7 +247,7 @@ impl Bank {
         for drive in 0..self.drives.len() {
             self.weigh_drive(drive);
         }
-        self.declared.take(&self.window, dt_s);
+        self.declared.take(&self.window, terms, dt_s);
         for fault in 0..self.declared.len() {
             self.weigh_declared(fault);
         }

@@ -4,7 +4,7 @@ use super::component::Target;
 use super::law::{BLOCKS, Law};
 use super::orders::WheelOrders;
 use super::shift::ShiftLaw;
-use super::signature::{Evidence, Signature, Signatures, means};
+use super::signature::{Evidence, Seen, Signature, Signatures, Terms, means};
 use super::turning::{TurningSignature, TurningSignatures, WheelNoise};
 use super::window::Window;
 use crate::description::Description;
@@ -152,15 +152,19 @@ impl DeclaredFaults {
         }
     }
 
-    /// Takes the signatures' part of a window, which is `dt_s` newer than the last one.
-    pub fn take(&mut self, window: &Window, dt_s: f64) {
+    /// Takes the signatures' part of a window, which is `dt_s` newer than the last one, under a
+    /// command.
+    pub fn take(&mut self, window: &Window, terms: Terms, dt_s: f64) {
         if self.signatures.is_empty() || window.whole_blocks() < BLOCKS {
             return;
         }
-        let found = self.signatures.standardized(&means(window, self.channels));
+        let seen = Seen {
+            means: self.signatures.standardized(&means(window, self.channels)),
+            terms,
+        };
         for declared in &mut self.all {
             if let Some(signature) = &declared.signature {
-                declared.evidence.take(signature.log_ratio(&found), dt_s);
+                declared.evidence.take(signature.log_ratio(&seen), dt_s);
             }
         }
     }
@@ -170,6 +174,13 @@ impl DeclaredFaults {
     pub fn evidence(&self, fault: usize) -> Option<f64> {
         let declared = &self.all[fault];
         declared.is_taught().then(|| declared.evidence.log_ratio())
+    }
+
+    /// What the evidence of each fault lacks beside that of the others because ratios are bounded,
+    /// nats.
+    #[must_use]
+    pub fn beyond_bound(&self, fault: usize) -> f64 {
+        self.all[fault].evidence.beyond_bound()
     }
 
     /// True if a fault comes back with the turns of a wheel.

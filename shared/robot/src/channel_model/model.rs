@@ -21,7 +21,7 @@ use crate::learned::{Calibration, Form};
 use crate::model_file::{self, ModelFile, check_range, refuse};
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 /// The word by which the file is told from a model of the rover's kind.
 pub const KIND: &str = "channels";
 /// Prior fault rate at which log-odds are collected and tempered, 1/h.
@@ -357,7 +357,7 @@ impl ModelFile for Model {
         if !self.signatures.fits(count) {
             let found = format!("{} faults", self.signatures.fault.len());
             let allowed = "at most 8 faults of 1 to 8 phases, each with three numbers up to 1e9 \
-                           for each channel, and deviations from 1e-3";
+                           for each channel and term, and deviations from 1e-3";
             return refuse("signatures", found, allowed);
         }
         if !self.turning.fits(count) {

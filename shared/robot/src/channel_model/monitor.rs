@@ -24,8 +24,9 @@ use super::model::{Class, FAULT_RATE_1_H, Model, Tail};
 use super::observation::History;
 use super::orders::WheelOrders;
 use super::scatter::ScatterLaw;
+use super::signature::terms;
 use super::window::Window;
-use super::{CHANNELS_MAX, COMPONENTS_MAX};
+use super::{AXES, CHANNELS_MAX, COMPONENTS_MAX};
 use crate::description::Description;
 use crate::fault_table::DECLARED_MAX;
 use crate::learned::channels::Channels;
@@ -93,6 +94,8 @@ struct Watch {
 pub struct Monitor {
     bank: Bank,
     ranges: Vec<Range>,
+    /// Size of each axis of the command.
+    sizes: [f64; AXES],
     combinations: Combinations,
     /// Observations that a prediction looks back.
     lags: usize,
@@ -156,6 +159,7 @@ impl Monitor {
             watched,
             bank: Bank::new(window, laws, sensed, driven, (declared, at.declared)),
             ranges: model.command.clone(),
+            sizes: model.sizes(),
             combinations: model.combinations.clone(),
             lags: lags(model.interval_s),
             knows_rest: model.knows_rest(),
@@ -241,7 +245,7 @@ impl Monitor {
         let places = &self.places;
         let measured = |channel: usize| now.values[places[channel]].is_some();
         // After a break what was said before stands until there is something new to say.
-        if self.bank.weigh(measured, now.dt_s) {
+        if self.bank.weigh(measured, terms(now, &self.sizes), now.dt_s) {
             self.sum_up();
             self.report.evidence = -0.5 * self.bank.mean_square();
         }
@@ -343,8 +347,16 @@ impl Monitor {
         };
         let total = log_sum_exp(&odds[first..n]);
         let mut shares = [IMPOSSIBLE; DECLARED_MAX + 1];
-        for (share, raw) in shares.iter_mut().zip(&raw[first..n]) {
-            *share = slope * log_sum_exp(&classes.map(|class| raw[class]));
+        let declared = self.bank.declared();
+        for (i, (share, raw)) in shares.iter_mut().zip(&raw[first..n]).enumerate() {
+            let beyond = match declared.pair() {
+                Some((both, _)) if i == declared.len() => {
+                    both.map(|one| declared.beyond_bound(one)).iter().sum()
+                }
+                _ if i < declared.len() => declared.beyond_bound(i),
+                _ => 0.0,
+            };
+            *share = slope * (log_sum_exp(&classes.map(|class| raw[class])) + beyond);
         }
         let sum = log_sum_exp(&shares[..n - first]);
         for (odds, share) in odds[first..n].iter_mut().zip(shares) {

@@ -2,16 +2,17 @@
 //!
 //! The whitened residuals of each channel are averaged over the last 0.5, 2 and 4 s. A fault that
 //! has begun moves these means in a way that changes with its age, so a signature has a few phases.
-//! The evidence of a phase is linear in the means `v`, `w·v - c`, with `w = C⁻¹μ` and
-//! `c = ½ μᵀC⁻¹μ` for its mean `μ` and a covariance `C` (Fisher's discriminant): the log-likelihood
-//! ratio of two Gaussian laws with one covariance. Successive ratios are of the same residuals, so
-//! they are averaged over time and never summed.
+//! What it does also depends on what is commanded: the mean of a phase is `Mb`, with `b` a one and
+//! the command. The evidence of a phase is `bᵀMᵀC⁻¹v - ½ bᵀMᵀC⁻¹Mb` for means `v` and a covariance
+//! `C` (Fisher's discriminant): the log-likelihood ratio of two Gaussian laws with one covariance.
+//! Successive ratios are of the same residuals, so they are averaged over time and never summed.
 
 use serde::{Deserialize, Serialize};
 
-use super::CHANNELS_MAX;
 use super::law::BLOCKS;
+use super::observation::{Observation, SMOOTHING_S};
 use super::window::Window;
+use super::{AXES, CHANNELS_MAX};
 use crate::fault_table::DECLARED_MAX;
 
 /// Newest blocks that each mean spans.
@@ -27,6 +28,8 @@ pub const SD_MIN: f64 = 1e-3;
 const NUMBER_MAX: f64 = 1e9;
 /// A single ratio says no more than this, nats.
 const LOG_RATIO_MAX: f64 = 40.0;
+/// The most that it says among faults, nats.
+const UNBOUNDED_MAX: f64 = 1e6;
 /// Time constant over which ratios are averaged, s.
 const AVERAGE_S: f64 = 0.35;
 
@@ -38,6 +41,27 @@ pub const fn means_count(channels: usize) -> usize {
 
 /// Means of the whitened residuals of all channels, span by span; missing ones are 0.
 pub type Means = [f64; MEANS_MAX];
+/// Terms of a command: a one, and its axes relative to their sizes; 0 for those that are not there.
+pub type Terms = [f64; 1 + AXES];
+
+/// The terms of the command of the last two seconds, whose axes have these sizes.
+#[must_use]
+pub fn terms(now: &Observation, sizes: &[f64; AXES]) -> Terms {
+    let command = &now.smoothed[SMOOTHING_S.len() - 1];
+    std::array::from_fn(|term| match term {
+        0 => 1.0,
+        axis => command[axis - 1] / sizes[axis - 1],
+    })
+}
+
+/// What the last seconds show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// Means as deviations from those of a healthy robot.
+    pub means: Means,
+    /// The command in which they were seen.
+    pub terms: Terms,
+}
 
 /// The means that the last seconds of so many channels show.
 #[must_use]
@@ -57,10 +81,33 @@ pub fn means(window: &Window, channels: usize) -> Means {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Phase {
-    /// Weight of each standardized mean.
-    pub weights: Vec<f64>,
-    /// What is taken off their sum.
-    pub offset: f64,
+    /// Weight of each standardized mean, by the terms of the command.
+    pub weights: Vec<Vec<f64>>,
+    /// Square of the fault's own mean, by pairs of terms.
+    pub squares: Vec<Vec<f64>>,
+}
+
+impl Phase {
+    /// True if it is of this many means.
+    fn fits(&self, means: usize) -> bool {
+        let terms = self.weights.len();
+        let is_sane = |value: &f64| value.abs() <= NUMBER_MAX;
+        let are = |rows: &[Vec<f64>], length: usize| {
+            let is_row = |row: &Vec<f64>| row.len() == length && row.iter().all(is_sane);
+            rows.len() == terms && rows.iter().all(is_row)
+        };
+        (1..=1 + AXES).contains(&terms) && are(&self.weights, means) && are(&self.squares, terms)
+    }
+
+    /// Log-likelihood ratio of the fault, in this phase, to health.
+    fn log_ratio(&self, seen: &Seen) -> f64 {
+        let dot = |row: &[f64], with: &[f64]| row.iter().zip(with).map(|(a, b)| a * b).sum::<f64>();
+        let rows = self.weights.iter().zip(&self.squares).zip(&seen.terms);
+        rows.map(|((weights, squares), term)| {
+            term * (dot(weights, &seen.means) - 0.5 * dot(squares, &seen.terms))
+        })
+        .sum()
+    }
 }
 
 /// How a fault shows.
@@ -99,13 +146,9 @@ impl Signatures {
     pub fn fits(&self, channels: usize) -> bool {
         let n = means_count(channels);
         let is_sane = |value: &f64| value.abs() <= NUMBER_MAX;
-        let is_phase = |phase: &Phase| {
-            let numbers = phase.weights.iter().chain([&phase.offset]);
-            phase.weights.len() == n && numbers.into_iter().all(is_sane)
-        };
         let is_whole = |one: &Signature| {
             let phases = one.phase.len();
-            (1..=PHASES_MAX).contains(&phases) && one.phase.iter().all(is_phase)
+            (1..=PHASES_MAX).contains(&phases) && one.phase.iter().all(|phase| phase.fits(n))
         };
         self.is_empty()
             || (self.mean.len() == n
@@ -131,11 +174,8 @@ impl Signatures {
 impl Signature {
     /// Log-likelihood ratio of the fault, in any of its phases, to health.
     #[must_use]
-    pub fn log_ratio(&self, standardized: &Means) -> f64 {
-        let of = |phase: &Phase| {
-            let parts = phase.weights.iter().zip(standardized);
-            parts.map(|(weight, value)| weight * value).sum::<f64>() - phase.offset
-        };
+    pub fn log_ratio(&self, seen: &Seen) -> f64 {
+        let of = |phase: &Phase| phase.log_ratio(seen);
         let highest = self.phase.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
         let sum: f64 = self
             .phase
@@ -150,14 +190,20 @@ impl Signature {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Evidence {
     log_ratio: f64,
+    /// The same of ratios that are not bounded.
+    unbounded: f64,
 }
 
 impl Evidence {
     /// Takes the ratio of an observation of this length.
     pub fn take(&mut self, log_ratio: f64, dt_s: f64) {
         let keep = (-dt_s / AVERAGE_S).exp();
-        let ratio = log_ratio.clamp(-LOG_RATIO_MAX, LOG_RATIO_MAX);
-        self.log_ratio = (keep * self.log_ratio + (1.0 - keep) * ratio).max(0.0);
+        let averaged = |before: f64, most: f64| {
+            let ratio = log_ratio.clamp(-LOG_RATIO_MAX, most);
+            (keep * before + (1.0 - keep) * ratio).max(0.0)
+        };
+        self.log_ratio = averaged(self.log_ratio, LOG_RATIO_MAX);
+        self.unbounded = averaged(self.unbounded, UNBOUNDED_MAX);
     }
 
     /// The evidence, nats.
@@ -165,40 +211,55 @@ impl Evidence {
     pub const fn log_ratio(&self) -> f64 {
         self.log_ratio
     }
+
+    /// What it lacks because each ratio is bounded, nats: beside health that is as good as
+    /// certain, but not among faults.
+    #[must_use]
+    pub const fn beyond_bound(&self) -> f64 {
+        self.unbounded - self.log_ratio
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn standardized(values: &[f64]) -> Means {
-        let mut out = [0.0; MEANS_MAX];
-        out[..values.len()].copy_from_slice(values);
-        out
+    fn seen(values: &[f64], terms: Terms) -> Seen {
+        let mut means = [0.0; MEANS_MAX];
+        means[..values.len()].copy_from_slice(values);
+        Seen { means, terms }
     }
 
     #[test]
     fn evidence_is_the_ratio_of_two_gaussian_laws_averaged_over_phases() {
-        // One channel; the means are independent and of unit variance.
-        let phase = |mean: [f64; 3]| Phase {
-            weights: mean.to_vec(),
-            offset: 0.5 * mean.iter().map(|m| m * m).sum::<f64>(),
+        // One channel; the means are independent and of unit variance. In each phase what a fault
+        // does without a command, and what each unit of the first axis adds to it.
+        let phases = [
+            [[1.0, 2.0, 0.5], [0.5, -1.0, 0.0]],
+            [[-1.0, 0.0, 3.0], [0.0, 2.0, 1.0]],
+        ];
+        let dot = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum();
+        let phase = |rows: [[f64; 3]; 2]| Phase {
+            weights: rows.map(|row| row.to_vec()).to_vec(),
+            squares: rows.map(|a| rows.map(|b| dot(&a, &b)).to_vec()).to_vec(),
         };
-        let means = [[1.0, 2.0, 0.5], [-1.0, 0.0, 3.0]];
         let signature = Signature {
             fault: "engine".to_owned(),
             runs: 2,
-            phase: means.map(phase).to_vec(),
+            phase: phases.map(phase).to_vec(),
         };
-        let seen = [0.3, 1.8, 0.1];
-        let log_density = |mean: [f64; 3]| {
-            let parts = seen.iter().zip(mean);
-            -0.5 * parts.map(|(x, m)| (x - m) * (x - m)).sum::<f64>()
-        };
-        let ratio = |mean| (log_density(mean) - log_density([0.0; 3])).exp();
-        let expected = (0.5 * (ratio(means[0]) + ratio(means[1]))).ln();
-        let found = signature.log_ratio(&standardized(&seen));
-        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        let values = [0.3, 1.8, 0.1];
+        for command in [0.0, 0.4, -1.0] {
+            let ratio = |rows: [[f64; 3]; 2]| {
+                let mean = |i: usize| rows[0][i] + command * rows[1][i];
+                let squares = |i: usize| values[i] * values[i] - (values[i] - mean(i)).powi(2);
+                (0..3).map(|i| 0.5 * squares(i)).sum::<f64>().exp()
+            };
+            let expected = (0.5 * (ratio(phases[0]) + ratio(phases[1]))).ln();
+            let terms = [1.0, command, 0.0, 0.0, 0.0];
+            let found = signature.log_ratio(&seen(&values, terms));
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        }
     }
 
     #[test]
@@ -224,8 +285,8 @@ mod tests {
                 runs: 1,
                 phase: vec![
                     Phase {
-                        weights: vec![0.0; weights],
-                        offset: 0.0,
+                        weights: vec![vec![0.0; weights]; 2],
+                        squares: vec![vec![0.0; 2]; 2],
                     };
                     phases
                 ],
@@ -237,7 +298,10 @@ mod tests {
         assert!(!of(6, 1.0, 0).fits(2) && !of(6, 1.0, 9).fits(2));
         for wrong in [f64::NAN, f64::INFINITY, -1e10] {
             let mut signatures = of(6, 1.0, 1);
-            signatures.fault[0].phase[0].weights[3] = wrong;
+            signatures.fault[0].phase[0].weights[1][3] = wrong;
+            assert!(!signatures.fits(2));
+            let mut signatures = of(6, 1.0, 1);
+            signatures.fault[0].phase[0].squares[0][1] = wrong;
             assert!(!signatures.fits(2));
             let mut signatures = of(6, 1.0, 1);
             signatures.mean[0] = wrong;

@@ -1,8 +1,9 @@
 //! Signatures of declared faults from labelled runs.
 //!
 //! A fault's mean is that of its runs' means in each phase of its age: a long run counts no more
-//! than a short one. Its covariance lies between that of health and that of its own runs; the fewer
-//! these are, the nearer to health. A signature is kept if it finds at least half of the fault's
+//! than a short one. The covariance lies between that of health and that of the runs; the fewer
+//! these are, the nearer to health. All faults share it: only then do their ratios to health tell
+//! them apart. A signature is kept if it finds at least half of the fault's
 //! runs without having seen the group that they are of, so one of a single group never is.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,10 +16,10 @@ use vigil_robot::Description;
 use vigil_robot::channel_model::channel::commands;
 use vigil_robot::channel_model::law::BLOCKS;
 use vigil_robot::channel_model::signature::{
-    Evidence, Means, Phase, SD_MIN, Signature, Signatures, means, means_count,
+    Evidence, Means, Phase, SD_MIN, Seen, Signature, Signatures, means, means_count, terms,
 };
 use vigil_robot::channel_model::window::Window;
-use vigil_robot::channel_model::{Model, Scales};
+use vigil_robot::channel_model::{AXES, Model, Scales};
 
 use super::record::{self, Record};
 use super::unseen;
@@ -30,6 +31,8 @@ const PHASES_S: [[f64; 2]; 4] = [[0.25, 1.0], [1.0, 2.0], [2.0, 4.0], [4.0, 9.0]
 /// Share of the runs' own covariance for many runs, and the number of runs for half of that.
 const OWN_SHARE: f64 = 0.5;
 const OWN_RUNS: f64 = 3.0;
+/// Runs that would have shown, each at full command, that it changes nothing.
+const STEADY_RUNS: f64 = 1.0;
 /// Part of a covariance that is taken for independent.
 const INDEPENDENT: f64 = 0.1;
 /// A run is found if its evidence exceeds this, nats, and the highest in health by a factor, within
@@ -56,7 +59,7 @@ struct Sample<'a> {
     group: String,
     /// Age, s, and length of the observation, s.
     ages: Vec<[f64; 2]>,
-    means: Vec<Means>,
+    seen: Vec<Seen>,
 }
 
 /// What came of a declared fault's runs.
@@ -154,15 +157,16 @@ pub(super) fn fit(
         sd: sd.clone(),
         fault: Vec::new(),
     };
-    for means in healthy.iter_mut().flat_map(|run| &mut run.means) {
-        *means = model.signatures.standardized(means);
+    for seen in healthy.iter_mut().flat_map(|run| &mut run.seen) {
+        seen.means = model.signatures.standardized(&seen.means);
     }
     let health = Health {
+        terms: 1 + model.command.len().min(AXES),
         correlation: DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (sd[i] * sd[j])),
         runs: healthy,
     };
     let samples = samples(model, (labelled, groups), (robot, scales, until_s));
-    let mut told = Vec::new();
+    let (mut told, mut used, mut shown) = (Vec::new(), Vec::new(), Vec::new());
     for fault in robot.fault.iter().filter(|fault| fault.wheel.is_none()) {
         let of_fault = samples.iter().filter(|one| one.label.fault == fault.name);
         let runs: Vec<&Sample<'_>> = of_fault.collect();
@@ -173,9 +177,11 @@ pub(super) fn fit(
         }
         let groups: BTreeSet<&str> = runs.iter().map(|run| run.group.as_str()).collect();
         let runs_found = found(&health, &fault.name, &runs);
-        let signature = health.signature(&fault.name, &runs);
-        let is_enough = groups.len() > 1 && 2 * runs_found >= runs.len();
-        let signature = signature.filter(|_| is_enough);
+        let is_used = groups.len() > 1 && 2 * runs_found >= runs.len();
+        if is_used {
+            used.push(fault.name.as_str());
+            shown.push(Shown::new(&runs, &health));
+        }
         told.push(FaultFit {
             fault: fault.name.clone(),
             wheel: None,
@@ -184,10 +190,10 @@ pub(super) fn fit(
             runs_with_onset: runs.len(),
             groups: groups.len(),
             runs_found,
-            is_used: signature.is_some(),
+            is_used,
         });
-        model.signatures.fault.extend(signature);
     }
+    model.signatures.fault = health.signatures(&used, &shown).unwrap_or_default();
     if model.signatures.is_empty() {
         model.signatures = Signatures::default();
     }
@@ -198,10 +204,12 @@ pub(super) fn fit(
 #[derive(Default)]
 struct HealthyRun {
     dt_s: Vec<f64>,
-    means: Vec<Means>,
+    seen: Vec<Seen>,
 }
 
 struct Health {
+    /// Terms of the command.
+    terms: usize,
     /// Correlation of the standardized means.
     correlation: DMatrix<f64>,
     /// Standardized means.
@@ -212,6 +220,7 @@ struct Health {
 fn healthy_means(models: &[Model], records: &[Record], scales: &Scales) -> Vec<HealthyRun> {
     let mut out: Vec<HealthyRun> = Vec::new();
     let mut part = None;
+    let sizes = models.first().map_or([1.0; AXES], Model::sizes);
     unseen::windows(models, records, scales, |sight| {
         let record = &records[sight.record];
         let Some(now) = record.histories[sight.newest].ago(0) else {
@@ -227,7 +236,10 @@ fn healthy_means(models: &[Model], records: &[Record], scales: &Scales) -> Vec<H
         let channels = models[fold].channel.len();
         if let Some(run) = out.last_mut() {
             run.dt_s.push(now.dt_s);
-            run.means.push(means(sight.window, channels));
+            run.seen.push(Seen {
+                means: means(sight.window, channels),
+                terms: terms(now, &sizes),
+            });
         }
     });
     out
@@ -235,7 +247,11 @@ fn healthy_means(models: &[Model], records: &[Record], scales: &Scales) -> Vec<H
 
 /// Mean and covariance of the first `n` means.
 fn moments(runs: &[HealthyRun], n: usize) -> Option<(DVector<f64>, DMatrix<f64>)> {
-    let all = || runs.iter().flat_map(|run| &run.means);
+    let all = || {
+        runs.iter()
+            .flat_map(|run| &run.seen)
+            .map(|seen| &seen.means)
+    };
     let count = all().count();
     (count > n).then(|| {
         let part = 1.0 / count as f64;
@@ -261,7 +277,7 @@ fn samples<'a>(
     (labelled, groups): (&'a [LabelledRun<'a>], &[(u32, String)]),
     (robot, scales, until_s): (&Description, &Scales, f64),
 ) -> Vec<Sample<'a>> {
-    let n = model.channel.len();
+    let (n, sizes) = (model.channel.len(), model.sizes());
     let used = model.channel.iter().cloned().enumerate().collect();
     let mut window = Window::new(used, scales.clone(), model.interval_s);
     let mut sample = |label: &'a LabelledRun<'a>| {
@@ -269,7 +285,7 @@ fn samples<'a>(
             label,
             group: record::group(label.run, groups),
             ages: Vec::new(),
-            means: Vec::new(),
+            seen: Vec::new(),
         };
         window.reset();
         let mut is_healthy_first = false;
@@ -288,7 +304,10 @@ fn samples<'a>(
                 if age_s >= 0.0 && is_whole && is_healthy_first {
                     out.ages.push([age_s, now.dt_s]);
                     let found = means(&window, n);
-                    out.means.push(model.signatures.standardized(&found));
+                    out.seen.push(Seen {
+                        means: model.signatures.standardized(&found),
+                        terms: terms(now, &sizes),
+                    });
                 }
             }
         }
@@ -297,63 +316,114 @@ fn samples<'a>(
     labelled.iter().filter_map(&mut sample).collect()
 }
 
+/// What runs of one fault show.
+struct Shown {
+    runs: usize,
+    /// Mean of each phase that they show, a column for each term of the command.
+    phases: Vec<DMatrix<f64>>,
+    /// Sum of squares about these, over so many observations.
+    spread: DMatrix<f64>,
+    count: f64,
+}
+
+impl Shown {
+    fn new(runs: &[&Sample<'_>], health: &Health) -> Self {
+        let n = health.correlation.nrows();
+        let mut shown = Self {
+            runs: runs.len(),
+            phases: Vec::new(),
+            spread: DMatrix::zeros(n, n),
+            count: 0.0,
+        };
+        for [from, to] in PHASES_S {
+            let in_phase = |run: &&Sample<'_>| {
+                let ages = run.ages.iter().zip(&run.seen);
+                let within = ages.filter(|([age, _], _)| (from..to).contains(age));
+                within.map(|(_, seen)| *seen).collect::<Vec<_>>()
+            };
+            let found = runs.iter().map(in_phase);
+            let found: Vec<Vec<Seen>> = found.filter(|found| !found.is_empty()).collect();
+            let Some(by_terms) = by_terms(&found, n, health.terms) else {
+                continue;
+            };
+            for seen in found.iter().flatten() {
+                let terms = DVector::from_column_slice(&seen.terms[..health.terms]);
+                let apart = vector(&seen.means, n) - &by_terms * terms;
+                shown.spread.ger(1.0, &apart, &apart, 1.0);
+                shown.count += 1.0;
+            }
+            shown.phases.push(by_terms);
+        }
+        shown
+    }
+}
+
+/// What the runs' `n` means have in common, and what the command changes of it: ridge regression
+/// on its `m` terms. Each run is one observation, and as many as [`STEADY_RUNS`] are taken to have shown
+/// that the command changes nothing. None of no runs.
+fn by_terms(runs: &[Vec<Seen>], n: usize, m: usize) -> Option<DMatrix<f64>> {
+    let mut gram = DMatrix::from_fn(m, m, |i, j| match i == j && i > 0 {
+        true => STEADY_RUNS,
+        false => 0.0,
+    });
+    let mut products = DMatrix::zeros(n, m);
+    for run in runs {
+        let part = 1.0 / run.len() as f64;
+        let (mut means, mut terms) = (DVector::zeros(n), DVector::zeros(m));
+        for seen in run {
+            means += part * vector(&seen.means, n);
+            terms += part * DVector::from_column_slice(&seen.terms[..m]);
+        }
+        gram.ger(1.0, &terms, &terms, 1.0);
+        products.ger(1.0, &means, &terms, 1.0);
+    }
+    let solved = gram.cholesky()?.solve(&products.transpose());
+    Some(solved.transpose())
+}
+
 impl Health {
     /// The signature that these runs show; none if they show no phase.
     fn signature(&self, fault: &str, runs: &[&Sample<'_>]) -> Option<Signature> {
+        let shown = [Shown::new(runs, self)];
+        self.signatures(&[fault], &shown)?.pop()
+    }
+
+    /// The signatures of faults that are told apart by one covariance; none if there is none.
+    fn signatures(&self, faults: &[&str], shown: &[Shown]) -> Option<Vec<Signature>> {
         let n = self.correlation.nrows();
-        let mut spread = DMatrix::zeros(n, n);
-        let (mut phases, mut count) = (Vec::new(), 0.0);
-        for [from, to] in PHASES_S {
-            let in_phase = |run: &&Sample<'_>| {
-                let ages = run.ages.iter().zip(&run.means);
-                let within = ages.filter(|([age, _], _)| (from..to).contains(age));
-                within.map(|(_, m)| vector(m, n)).collect::<Vec<_>>()
-            };
-            let found: Vec<Vec<DVector<f64>>> = runs
-                .iter()
-                .map(in_phase)
-                .filter(|found| !found.is_empty())
-                .collect();
-            if found.is_empty() {
-                continue;
-            }
-            let mean_of = |all: &Vec<DVector<f64>>| {
-                let sum = all.iter().fold(DVector::zeros(n), |sum, one| sum + one);
-                sum / all.len() as f64
-            };
-            let means = found.iter().map(mean_of);
-            let mean = means.fold(DVector::zeros(n), |sum, one| sum + one) / found.len() as f64;
-            for one in found.iter().flatten() {
-                let apart = one - &mean;
-                spread.ger(1.0, &apart, &apart, 1.0);
-                count += 1.0;
-            }
-            phases.push(mean);
-        }
-        let runs_count = runs.len() as f64;
-        let own = OWN_SHARE * runs_count / (runs_count + OWN_RUNS);
+        let runs: usize = shown.iter().map(|one| one.runs).sum();
+        let count: f64 = shown.iter().map(|one| one.count).sum();
+        let spread = shown
+            .iter()
+            .fold(DMatrix::zeros(n, n), |sum, one| sum + &one.spread);
+        let own = OWN_SHARE * runs as f64 / (runs as f64 + OWN_RUNS);
         let mixed = (1.0 - own) * &self.correlation + own / f64::max(count, 1.0) * spread;
         let diagonal = DMatrix::from_diagonal(&mixed.diagonal());
         let inverse = ((1.0 - INDEPENDENT) * mixed + INDEPENDENT * diagonal).cholesky()?;
-        let phase = |mean: DVector<f64>| {
-            let weights = inverse.solve(&mean);
+        let rows = |of: &DMatrix<f64>| -> Vec<Vec<f64>> {
+            let rows = of.row_iter();
+            rows.map(|row| row.iter().copied().collect()).collect()
+        };
+        let phase = |by_terms: &DMatrix<f64>| {
+            let weights = inverse.solve(by_terms);
             Phase {
-                offset: 0.5 * weights.dot(&mean),
-                weights: weights.iter().copied().collect(),
+                squares: rows(&(by_terms.transpose() * &weights)),
+                weights: rows(&weights.transpose()),
             }
         };
-        let phase: Vec<Phase> = phases.into_iter().map(phase).collect();
-        (!phase.is_empty()).then(|| Signature {
-            fault: fault.to_owned(),
-            runs: runs.len(),
-            phase,
-        })
+        let signature = |(fault, shown): (&&str, &Shown)| Signature {
+            fault: (*fault).to_owned(),
+            runs: shown.runs,
+            phase: shown.phases.iter().map(phase).collect(),
+        };
+        let all = faults.iter().zip(shown).map(signature);
+        Some(all.filter(|one| !one.phase.is_empty()).collect())
     }
 
     /// The highest evidence that a signature has without a fault.
     fn highest(&self, signature: &Signature) -> f64 {
         let of_run = |run: &HealthyRun| {
-            let observations = run.dt_s.iter().zip(&run.means);
+            let observations = run.dt_s.iter().zip(&run.seen);
             highest(signature, observations.map(|(dt_s, m)| (*dt_s, m)))
         };
         self.runs.iter().map(of_run).fold(0.0, f64::max)
@@ -361,13 +431,13 @@ impl Health {
 }
 
 /// The highest evidence over successive means, each of an observation of so many seconds.
-fn highest<'a>(signature: &Signature, means: impl Iterator<Item = (f64, &'a Means)>) -> f64 {
+fn highest<'a>(signature: &Signature, all: impl Iterator<Item = (f64, &'a Seen)>) -> f64 {
     let mut evidence = Evidence::default();
-    let step = |(dt_s, means): (f64, &Means)| {
-        evidence.take(signature.log_ratio(means), dt_s);
+    let step = |(dt_s, seen): (f64, &Seen)| {
+        evidence.take(signature.log_ratio(seen), dt_s);
         evidence.log_ratio()
     };
-    means.map(step).fold(0.0, f64::max)
+    all.map(step).fold(0.0, f64::max)
 }
 
 /// How many of a fault's runs are found by the signature that the other groups show.
@@ -389,7 +459,7 @@ fn found(health: &Health, fault: &str, runs: &[&Sample<'_>]) -> usize {
         };
         let threshold = FOUND.max(FOUND_RATIO * health.highest(&signature));
         let is_found = |run: &&&Sample<'_>| {
-            let observations = run.ages.iter().zip(&run.means);
+            let observations = run.ages.iter().zip(&run.seen);
             highest(&signature, observations.map(|([_, dt_s], m)| (*dt_s, m))) > threshold
         };
         found += left_out.iter().filter(is_found).count();

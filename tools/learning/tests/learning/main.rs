@@ -4,6 +4,7 @@
 
 mod channel_learning;
 mod channel_sensing;
+mod commanded_faults;
 mod declared_faults;
 mod isolability;
 mod learning;
