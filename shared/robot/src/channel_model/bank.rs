@@ -224,7 +224,8 @@ impl Bank {
     }
 
     /// Weighs all faults; `measured`: what of the channels the newest observation holds, which
-    /// lasted `dt_s`; `terms`: of the command. False if the window is too short yet to say anything.
+    /// lasted `dt_s`; `terms`: of the command. False if the window is too short yet to say
+    /// anything.
     pub fn weigh(&mut self, measured: impl Fn(usize) -> bool, terms: Terms, dt_s: f64) -> bool {
         let n = self.channels.len();
         self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];

@@ -4,7 +4,7 @@ use super::component::Target;
 use super::law::{BLOCKS, Law};
 use super::orders::WheelOrders;
 use super::shift::ShiftLaw;
-use super::signature::{Evidence, Seen, Signature, Signatures, Terms, means};
+use super::signature::{Evidence, Features, Signature, Signatures, Terms, means};
 use super::turning::{TurningSignature, TurningSignatures, WheelNoise};
 use super::window::Window;
 use crate::description::Description;
@@ -158,7 +158,7 @@ impl DeclaredFaults {
         if self.signatures.is_empty() || window.whole_blocks() < BLOCKS {
             return;
         }
-        let seen = Seen {
+        let seen = Features {
             means: self.signatures.standardized(&means(window, self.channels)),
             terms,
         };

@@ -56,7 +56,7 @@ pub fn terms(now: &Observation, sizes: &[f64; AXES]) -> Terms {
 
 /// What the last seconds show.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Seen {
+pub struct Features {
     /// Means as deviations from those of a healthy robot.
     pub means: Means,
     /// The command in which they were seen.
@@ -100,7 +100,7 @@ impl Phase {
     }
 
     /// Log-likelihood ratio of the fault, in this phase, to health.
-    fn log_ratio(&self, seen: &Seen) -> f64 {
+    fn log_ratio(&self, seen: &Features) -> f64 {
         let dot = |row: &[f64], with: &[f64]| row.iter().zip(with).map(|(a, b)| a * b).sum::<f64>();
         let rows = self.weights.iter().zip(&self.squares).zip(&seen.terms);
         rows.map(|((weights, squares), term)| {
@@ -174,7 +174,7 @@ impl Signatures {
 impl Signature {
     /// Log-likelihood ratio of the fault, in any of its phases, to health.
     #[must_use]
-    pub fn log_ratio(&self, seen: &Seen) -> f64 {
+    pub fn log_ratio(&self, seen: &Features) -> f64 {
         let of = |phase: &Phase| phase.log_ratio(seen);
         let highest = self.phase.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
         let sum: f64 = self
@@ -224,10 +224,10 @@ impl Evidence {
 mod tests {
     use super::*;
 
-    fn seen(values: &[f64], terms: Terms) -> Seen {
+    fn seen(values: &[f64], terms: Terms) -> Features {
         let mut means = [0.0; MEANS_MAX];
         means[..values.len()].copy_from_slice(values);
-        Seen { means, terms }
+        Features { means, terms }
     }
 
     #[test]

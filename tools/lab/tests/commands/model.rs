@@ -212,7 +212,7 @@ fn a_model_of_channels_is_shown_and_an_edited_one_refused_in_the_same_way() {
     let shown = text(&["learn", "--show", "--model", CHANNELS]);
     for wanted in [
         "robot          kobuki",
-        "file layout    version 3",
+        "file layout    version 4",
         "frames         kobuki.csv.gz",
         "runs learned   1: 0",
         "of each run    the first 60 s",

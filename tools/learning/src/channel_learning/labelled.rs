@@ -16,7 +16,7 @@ use vigil_robot::Description;
 use vigil_robot::channel_model::channel::commands;
 use vigil_robot::channel_model::law::BLOCKS;
 use vigil_robot::channel_model::signature::{
-    Evidence, Means, Phase, SD_MIN, Seen, Signature, Signatures, means, means_count, terms,
+    Evidence, Features, Means, Phase, SD_MIN, Signature, Signatures, means, means_count, terms,
 };
 use vigil_robot::channel_model::window::Window;
 use vigil_robot::channel_model::{AXES, Model, Scales};
@@ -59,7 +59,7 @@ struct Sample<'a> {
     group: String,
     /// Age, s, and length of the observation, s.
     ages: Vec<[f64; 2]>,
-    seen: Vec<Seen>,
+    seen: Vec<Features>,
 }
 
 /// What came of a declared fault's runs.
@@ -204,7 +204,7 @@ pub(super) fn fit(
 #[derive(Default)]
 struct HealthyRun {
     dt_s: Vec<f64>,
-    seen: Vec<Seen>,
+    seen: Vec<Features>,
 }
 
 struct Health {
@@ -236,7 +236,7 @@ fn healthy_means(models: &[Model], records: &[Record], scales: &Scales) -> Vec<H
         let channels = models[fold].channel.len();
         if let Some(run) = out.last_mut() {
             run.dt_s.push(now.dt_s);
-            run.seen.push(Seen {
+            run.seen.push(Features {
                 means: means(sight.window, channels),
                 terms: terms(now, &sizes),
             });
@@ -304,7 +304,7 @@ fn samples<'a>(
                 if age_s >= 0.0 && is_whole && is_healthy_first {
                     out.ages.push([age_s, now.dt_s]);
                     let found = means(&window, n);
-                    out.seen.push(Seen {
+                    out.seen.push(Features {
                         means: model.signatures.standardized(&found),
                         terms: terms(now, &sizes),
                     });
@@ -342,7 +342,7 @@ impl Shown {
                 within.map(|(_, seen)| *seen).collect::<Vec<_>>()
             };
             let found = runs.iter().map(in_phase);
-            let found: Vec<Vec<Seen>> = found.filter(|found| !found.is_empty()).collect();
+            let found: Vec<Vec<Features>> = found.filter(|found| !found.is_empty()).collect();
             let Some(by_terms) = by_terms(&found, n, health.terms) else {
                 continue;
             };
@@ -359,9 +359,9 @@ impl Shown {
 }
 
 /// What the runs' `n` means have in common, and what the command changes of it: ridge regression
-/// on its `m` terms. Each run is one observation, and as many as [`STEADY_RUNS`] are taken to have shown
-/// that the command changes nothing. None of no runs.
-fn by_terms(runs: &[Vec<Seen>], n: usize, m: usize) -> Option<DMatrix<f64>> {
+/// on its `m` terms. Each run is one observation, and as many as [`STEADY_RUNS`] are taken to have
+/// shown that the command changes nothing. None of no runs.
+fn by_terms(runs: &[Vec<Features>], n: usize, m: usize) -> Option<DMatrix<f64>> {
     let mut gram = DMatrix::from_fn(m, m, |i, j| match i == j && i > 0 {
         true => STEADY_RUNS,
         false => 0.0,
@@ -431,9 +431,9 @@ impl Health {
 }
 
 /// The highest evidence over successive means, each of an observation of so many seconds.
-fn highest<'a>(signature: &Signature, all: impl Iterator<Item = (f64, &'a Seen)>) -> f64 {
+fn highest<'a>(signature: &Signature, all: impl Iterator<Item = (f64, &'a Features)>) -> f64 {
     let mut evidence = Evidence::default();
-    let step = |(dt_s, seen): (f64, &Seen)| {
+    let step = |(dt_s, seen): (f64, &Features)| {
         evidence.take(signature.log_ratio(seen), dt_s);
         evidence.log_ratio()
     };
