@@ -15,6 +15,7 @@ use super::bank::{Bank, ChannelPlace, DrivePlace, IMPOSSIBLE, KINDS_MAX, Laws, W
 use super::belief::{ComponentBelief, NO_BELIEF, PairBelief};
 use super::channel::{Channel, Scales, commands, lags};
 use super::component::{Places, Quantity, Target, components, drives, targets};
+use super::context_change::ChangeWatch;
 use super::coverage::{Combinations, Range, widening};
 use super::declared_faults::{DeclaredFaults, Taught};
 use super::directions::{covariances, directions};
@@ -110,6 +111,7 @@ pub struct Monitor {
     classes: [f64; Class::ALL.len()],
     beliefs: [ComponentBelief; COMPONENTS_MAX],
     pair: Option<PairBelief>,
+    changes: ChangeWatch,
     report: DetectionOutput,
 }
 
@@ -148,6 +150,9 @@ impl Monitor {
             signatures: &model.signatures,
             turning: &model.turning,
         });
+        // They are of all channels, as all that is taught.
+        let learned = taught.map(|_| &model.contexts);
+        let changes = ChangeWatch::new(&robot.context, learned, places.len());
         let declared = DeclaredFaults::new(robot, &targets, &laws.mean, taught);
         let watched = watched(at, &sensed, &declared);
         let tail = |class: Class| model.tail(channels, class).cloned();
@@ -167,6 +172,7 @@ impl Monitor {
             classes: [IMPOSSIBLE; Class::ALL.len()],
             beliefs: [NO_BELIEF; COMPONENTS_MAX],
             pair: None,
+            changes,
             report: DetectionOutput {
                 log_odds: IMPOSSIBLE,
                 channels: [IMPOSSIBLE; SLOTS],
@@ -182,6 +188,7 @@ impl Monitor {
     /// Forgets everything.
     pub fn reset(&mut self) {
         self.bank.reset();
+        self.changes.clear();
         self.run_s = 0.0;
         self.sum_up();
         self.report.evidence = 0.0;
@@ -211,6 +218,12 @@ impl Monitor {
         self.pair
     }
 
+    /// Changes that are no fault.
+    #[must_use]
+    pub const fn changes(&self) -> &ChangeWatch {
+        &self.changes
+    }
+
     /// Log-odds of each class of faults at [`FAULT_RATE_1_H`], not tempered.
     #[must_use]
     pub const fn classes(&self) -> [f64; Class::ALL.len()] {
@@ -238,6 +251,10 @@ impl Monitor {
         self.bank
             .window_mut()
             .push(history, &commands(history), (widening, self.suspects));
+        if now.moving {
+            let (window, t_ns) = (self.bank.window(), now.t_ns);
+            self.changes.take(window, t_ns, now.dt_s);
+        }
         let places = &self.places;
         let measured = |channel: usize| now.values[places[channel]].is_some();
         // After a break what was said before stands until there is something new to say.
