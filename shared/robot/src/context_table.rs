@@ -13,4 +13,8 @@ pub const CONTEXTS_MAX: usize = 4;
 pub struct DeclaredContext {
     /// Name: that of its events, and the `mode` of its runs in a file of labels.
     pub name: String,
+    /// Channels in which it shows; left out: all. Of the velocity of a pose `forward` stands for
+    /// the part along the way, and `lateral` for that across it.
+    #[serde(default)]
+    pub shows: Vec<String>,
 }

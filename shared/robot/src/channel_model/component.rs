@@ -167,11 +167,15 @@ pub fn unfit(robot: &Description) -> Option<String> {
     let components = components(robot);
     let unfit = |fault: &DeclaredFault| unfit_fault(fault, robot, (&all, &components));
     let refused = robot.fault.iter().find_map(unfit);
-    refused.or_else(|| unfit_contexts(&robot.context, &components))
+    refused.or_else(|| unfit_contexts(&robot.context, &components, &all))
 }
 
 /// Why declared contexts cannot be watched; none if they can.
-fn unfit_contexts(contexts: &[DeclaredContext], components: &[Component]) -> Option<String> {
+fn unfit_contexts(
+    contexts: &[DeclaredContext],
+    components: &[Component],
+    all: &[Target],
+) -> Option<String> {
     let found = contexts.len();
     if found > CONTEXTS_MAX {
         return Some(format!("{found} contexts: allowed are {CONTEXTS_MAX}"));
@@ -180,7 +184,8 @@ fn unfit_contexts(contexts: &[DeclaredContext], components: &[Component]) -> Opt
         let mut nodes = components.iter();
         nodes.any(|node| node.name == *name || node.group.as_ref() == Some(name))
     };
-    let unfit = |(i, DeclaredContext { name }): (usize, &DeclaredContext)| {
+    let unfit = |(i, DeclaredContext { name, shows }): (usize, &DeclaredContext)| {
+        let is_unknown = |shown: &&String| all.iter().all(|target| target.name != **shown);
         let said = match name {
             name if !is_word(name) => format!("'{name}' is no name, which has {LETTERS}"),
             name if RESERVED.contains(&name.as_str()) => {
@@ -189,7 +194,11 @@ fn unfit_contexts(contexts: &[DeclaredContext], components: &[Component]) -> Opt
             name if is_node(name) || contexts[..i].iter().any(|other| other.name == *name) => {
                 "its name is taken".to_owned()
             }
-            _ => return None,
+            _ => format!(
+                "shows in '{}', which is no channel; there are {}",
+                shows.iter().find(is_unknown)?,
+                names(all)
+            ),
         };
         Some(format!("context '{name}': {said}"))
     };
@@ -253,11 +262,15 @@ fn unfit_fault(
     }
     let is_unknown = |shown: &&String| all.iter().all(|target| target.name != **shown);
     let unknown = fault.shows.iter().find(is_unknown)?;
-    let known: Vec<&str> = all.iter().map(|target| target.name.as_str()).collect();
     Some(format!(
         "fault '{name}' shows in '{unknown}', which is no channel; there are {}",
-        known.join(", ")
+        names(all)
     ))
+}
+
+fn names(all: &[Target]) -> String {
+    let names: Vec<&str> = all.iter().map(|target| target.name.as_str()).collect();
+    names.join(", ")
 }
 
 /// What turns a part of the command into motion: a wheel's motor, or an axis of the command where

@@ -11,9 +11,11 @@ use serde::{Deserialize, Serialize};
 use vigil_inference::logspace::log_sum_exp;
 
 use super::CHANNELS_MAX;
+use super::component::{Quantity, targets};
 use super::law::BLOCKS;
 use super::window::Window;
-use crate::context_table::{CONTEXTS_MAX, DeclaredContext};
+use crate::context_table::CONTEXTS_MAX;
+use crate::description::Description;
 
 /// Ages of a change that are tried, in blocks: 1 to 4.
 pub const AGES: usize = 4;
@@ -23,6 +25,8 @@ const BEFORE_MIN: usize = 2;
 pub const DIRECTIONS_MAX: usize = 4;
 /// Degrees of freedom of both laws. Chosen.
 const FREEDOM: f64 = 20.0;
+/// Predicted velocity of a pose, in deviations, from which on it has a way.
+const MOVES: f64 = 1.0;
 /// Largest weight, ratio and threshold of a file.
 const WEIGHT_MAX: f64 = 1e6;
 const RATIO_MAX: f64 = 1e9;
@@ -34,10 +38,33 @@ pub type Step = [f64; CHANNELS_MAX];
 /// The steps of all ages; none where the record is too short.
 pub type Steps = [Option<Step>; AGES];
 
-/// The steps that so many channels show, each over the deviation that it has if blocks are
-/// independent and of unit variance. A channel that is missing on one side shows none.
+/// What of a window is looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Seen {
+    /// Its channels.
+    pub channels: usize,
+    /// True if the first two are the velocity of a pose, forward and to the left.
+    pub has_pose: bool,
+}
+
+impl Seen {
+    /// All channels of a robot.
+    #[must_use]
+    pub fn of_robot(robot: &Description) -> Self {
+        let all = targets(robot);
+        let of = |i: usize| all.get(i).map(|target| target.quantity);
+        Self {
+            channels: all.len(),
+            has_pose: (of(0), of(1)) == (Some(Quantity::Forward), Some(Quantity::Lateral)),
+        }
+    }
+}
+
+/// The steps that channels show, each over the deviation that it has if blocks are independent and
+/// of unit variance. A channel that is missing on one side shows none. The velocity of a pose is
+/// taken along and across the way that it was to go in the newest blocks.
 #[must_use]
-pub fn steps(window: &Window, channels: usize) -> Steps {
+pub fn steps(window: &Window, seen: Seen) -> Steps {
     let whole = window.whole_blocks().min(BLOCKS);
     std::array::from_fn(|age| {
         let newest = age + 1;
@@ -46,14 +73,38 @@ pub fn steps(window: &Window, channels: usize) -> Steps {
             .filter(|&count| count >= BEFORE_MIN)?;
         let unit = 1.0 / (1.0 / newest as f64 + 1.0 / before as f64).sqrt();
         let mut step = [0.0; CHANNELS_MAX];
-        for (step, row) in step.iter_mut().zip(&window.z).take(channels) {
+        for (step, row) in step.iter_mut().zip(&window.z).take(seen.channels) {
             let (older, newer) = row[BLOCKS - whole..].split_at(before);
             if let (Some(older), Some(newer)) = (mean(older), mean(newer)) {
                 *step = unit * (newer - older);
             }
         }
+        if seen.has_pose {
+            let [forward, left] = [0, 1].map(|channel: usize| {
+                let row = &window.predicted[channel][BLOCKS - newest..];
+                row.iter().sum::<f64>() / newest as f64
+            });
+            (step[0], step[1]) = along_and_across(Velocity { forward, left }, step[0], step[1]);
+        }
         Some(step)
     })
+}
+
+/// A velocity over its deviations.
+struct Velocity {
+    forward: f64,
+    left: f64,
+}
+
+/// A step forward and to the left, along and across the way of a robot; of one that hardly moves
+/// as it is.
+fn along_and_across(way: Velocity, forward: f64, left: f64) -> (f64, f64) {
+    let speed = way.forward.hypot(way.left);
+    if speed < MOVES {
+        return (forward, left);
+    }
+    let (cos, sin) = (way.forward / speed, way.left / speed);
+    (cos * forward + sin * left, cos * left - sin * forward)
 }
 
 fn mean(values: &[Option<f64>]) -> Option<f64> {
@@ -181,7 +232,7 @@ pub struct ToldChange {
 pub struct ChangeWatch {
     /// With their places in the description.
     watched: Vec<(usize, ContextChange)>,
-    channels: usize,
+    seen: Seen,
     /// Time for which none is told yet, s.
     wait_s: f64,
     count: u32,
@@ -191,17 +242,14 @@ pub struct ChangeWatch {
 impl ChangeWatch {
     /// A watch of the changes of `declared` contexts that were learned.
     #[must_use]
-    pub fn new(
-        declared: &[DeclaredContext],
-        learned: Option<&ContextChanges>,
-        channels: usize,
-    ) -> Self {
+    pub fn new(robot: &Description, learned: Option<&ContextChanges>) -> Self {
+        let declared = &robot.context;
         let place = |one: &ContextChange| declared.iter().position(|it| it.name == one.context);
         let watched = learned.into_iter().flat_map(|learned| &learned.change);
         let watched = watched.filter_map(|one| Some((place(one)?, one.clone())));
         Self {
             watched: watched.collect(),
-            channels,
+            seen: Seen::of_robot(robot),
             wait_s: 0.0,
             count: 0,
             last: None,
@@ -223,7 +271,7 @@ impl ChangeWatch {
         if self.wait_s > 0.0 {
             return false;
         }
-        let steps = steps(window, self.channels);
+        let steps = steps(window, self.seen);
         let beyond = |(place, change): &(usize, ContextChange)| {
             let (log_ratio, age) = change.log_ratio(&steps)?;
             Some((log_ratio - change.threshold, *place, age))

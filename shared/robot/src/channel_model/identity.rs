@@ -82,6 +82,9 @@ impl fmt::Display for Identity {
         for (i, context) in self.contexts.iter().enumerate() {
             let before = ["", "; contexts"][usize::from(i == 0)];
             write!(f, "{before} {}", context.name)?;
+            if !context.shows.is_empty() {
+                write!(f, " (shows in {})", context.shows.join(" "))?;
+            }
         }
         Ok(())
     }

@@ -152,7 +152,7 @@ impl Monitor {
         });
         // They are of all channels, as all that is taught.
         let learned = taught.map(|_| &model.contexts);
-        let changes = ChangeWatch::new(&robot.context, learned, places.len());
+        let changes = ChangeWatch::new(robot, learned);
         let declared = DeclaredFaults::new(robot, &targets, &laws.mean, taught);
         let watched = watched(at, &sensed, &declared);
         let tail = |class: Class| model.tail(channels, class).cloned();

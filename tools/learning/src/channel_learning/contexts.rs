@@ -12,8 +12,8 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::Serialize;
 use vigil_robot::Description;
 use vigil_robot::channel_model::context_change::{
-    AGES, ChangeAge, ContextChange, ContextChanges, DIRECTIONS_MAX, Step, StepDirection, Steps,
-    WAIT_S, steps,
+    AGES, ChangeAge, ContextChange, ContextChanges, DIRECTIONS_MAX, Seen, Step, StepDirection,
+    Steps, WAIT_S, steps,
 };
 use vigil_robot::channel_model::law::BLOCK_S;
 use vigil_robot::channel_model::{Model, Scales};
@@ -138,13 +138,17 @@ pub(super) fn fit(
         return Vec::new();
     }
     let channels = model.channel.len();
-    let stretches = stretches(models, records, scales);
-    let health = Health::new(&stretches, &all, channels);
-    let Some(health) = health else {
-        return Vec::new();
-    };
+    let stretches = stretches(models, records, scales, Seen::of_robot(robot));
     let mut told = Vec::new();
     for context in &robot.context {
+        let shown = (0..channels).filter(|&i| {
+            let name = &model.channel[i].name;
+            context.shows.is_empty() || context.shows.contains(name)
+        });
+        let (shown, used) = (shown.collect(), (stretches.as_slice(), all.as_slice()));
+        let Some(health) = Health::new(used, shown, channels) else {
+            continue;
+        };
         let labels = all.iter().filter(|one| one.label.context == context.name);
         let labels: Vec<&Labelled<'_>> = labels.collect();
         if labels.is_empty() {
@@ -176,7 +180,7 @@ pub(super) fn fit(
 }
 
 /// The windows of motion, each seen through the model that has not seen it.
-fn stretches(models: &[Model], records: &[Record], scales: &Scales) -> Vec<Stretch> {
+fn stretches(models: &[Model], records: &[Record], scales: &Scales, seen: Seen) -> Vec<Stretch> {
     let mut out: Vec<Stretch> = Vec::new();
     let mut part = None;
     unseen::windows(models, records, scales, |sight| {
@@ -192,7 +196,7 @@ fn stretches(models: &[Model], records: &[Record], scales: &Scales) -> Vec<Stret
                 moments: Vec::new(),
             });
         }
-        let steps = steps(sight.window, models[fold].channel.len());
+        let steps = steps(sight.window, seen);
         if let Some(stretch) = out.last_mut().filter(|_| steps[0].is_some()) {
             stretch.moments.push(Moment {
                 t_s: now.t_ns as f64 * 1e-9,
@@ -207,39 +211,47 @@ fn stretches(models: &[Model], records: &[Record], scales: &Scales) -> Vec<Stret
 /// All runs, and what steps they show where nothing changes.
 struct Health<'a> {
     channels: usize,
+    /// The channels in which it shows.
+    shown: Vec<usize>,
     stretches: &'a [Stretch],
     all: &'a [Labelled<'a>],
     /// Roots of the covariances of each age.
     roots: Vec<DMatrix<f64>>,
 }
 
-fn vector(step: &Step, channels: usize) -> DVector<f64> {
-    DVector::from_column_slice(&step[..channels])
+fn vector(step: &Step, shown: &[usize]) -> DVector<f64> {
+    DVector::from_iterator(shown.len(), shown.iter().map(|&channel| step[channel]))
 }
 
 impl<'a> Health<'a> {
     /// None if the log is too short.
-    fn new(stretches: &'a [Stretch], all: &'a [Labelled<'a>], channels: usize) -> Option<Self> {
+    fn new(
+        (stretches, all): (&'a [Stretch], &'a [Labelled<'a>]),
+        shown: Vec<usize>,
+        channels: usize,
+    ) -> Option<Self> {
+        let n = shown.len();
         let mut health = Self {
             channels,
+            shown,
             stretches,
             all,
             roots: Vec::new(),
         };
         for age in 0..AGES {
-            let mut covariance = DMatrix::zeros(channels, channels);
+            let mut covariance = DMatrix::zeros(n, n);
             let mut count = 0;
             for stretch in stretches {
                 let moments = stretch.moments.iter();
                 for moment in moments.filter(|one| !health.is_near(stretch, one.t_s)) {
                     if let Some(step) = &moment.steps[age] {
-                        let step = vector(step, channels);
+                        let step = vector(step, &health.shown);
                         covariance.ger(1.0, &step, &step, 1.0);
                         count += 1;
                     }
                 }
             }
-            if count <= channels {
+            if count <= n {
                 return None;
             }
             covariance /= f64::from(count as u32);
@@ -272,7 +284,7 @@ impl<'a> Health<'a> {
         let moments = self.of(one).flat_map(|stretch| &stretch.moments);
         let near = moments.filter(|moment| (moment.t_s - at_s).abs() <= 0.5 * BLOCK_S);
         let steps = near.filter_map(|moment| moment.steps[age].as_ref());
-        steps.map(|step| vector(step, self.channels)).collect()
+        steps.map(|step| vector(step, &self.shown)).collect()
     }
 
     fn shows(&self, one: &Labelled<'_>) -> bool {
@@ -297,7 +309,7 @@ impl<'a> Health<'a> {
 
     /// The directions in which steps of an age are larger with a change. Each run counts alike.
     fn directions(&self, age: usize, runs: &[&Labelled<'_>]) -> Vec<StepDirection> {
-        let n = self.channels;
+        let n = self.shown.len();
         let mut moment = DMatrix::zeros(n, n);
         let mut count = 0.0;
         for run in runs {
@@ -322,11 +334,12 @@ impl<'a> Health<'a> {
         large.truncate(DIRECTIONS_MAX);
         let direction = |(i, ratio): (usize, f64)| {
             let white = eigen.eigenvectors.column(i).into_owned();
-            let weights = self.roots[age].tr_solve_lower_triangular(&white)?;
-            Some(StepDirection {
-                weights: weights.iter().copied().collect(),
-                ratio,
-            })
+            let found = self.roots[age].tr_solve_lower_triangular(&white)?;
+            let mut weights = vec![0.0; self.channels];
+            for (&channel, weight) in self.shown.iter().zip(&found) {
+                weights[channel] = *weight;
+            }
+            Some(StepDirection { weights, ratio })
         };
         large.into_iter().filter_map(direction).collect()
     }

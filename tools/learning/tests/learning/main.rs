@@ -4,6 +4,7 @@
 
 mod channel_learning;
 mod channel_sensing;
+mod contexts;
 mod declared_faults;
 mod isolability;
 mod learning;

@@ -1,5 +1,8 @@
 use nalgebra::{DMatrix, DVector};
 
+use super::super::channel::{Channel, Regressor, Scales, Term, commands};
+use super::super::observation::{History, Observation};
+use super::super::{AXES, law::BLOCK_S};
 use super::*;
 
 const N: usize = 3;
@@ -144,4 +147,97 @@ fn an_odd_file_does_not_fit() {
     let mut changes = of(2, 3.0, 5.0);
     changes.change = vec![changes.change[0].clone(); CONTEXTS_MAX + 1];
     assert!(!changes.fits(2), "too many changes");
+}
+
+/// A window of one block an observation over channels that are predicted to read these, after
+/// readings beyond that.
+fn window<const C: usize>(predicted: [f64; C], readings: &[[Option<f64>; C]]) -> Window {
+    let channel = |predicted: f64| Channel {
+        name: String::new(),
+        period: None,
+        terms: vec![Term {
+            of: Regressor::Constant,
+            index: 0,
+            lag: 0,
+            powers: [0; AXES],
+        }],
+        weights: vec![predicted],
+        variance: [1.0, 0.0, 0.0],
+        context_sd: [0.0; 2],
+        usual: 0.0,
+        silence_s: 0.0,
+        held_out_ratio: 1.0,
+    };
+    let channels = predicted.map(channel).into_iter().enumerate().collect();
+    let scales = Scales::new([1.0; AXES], Vec::new(), BLOCK_S);
+    let mut window = Window::new(channels, scales, BLOCK_S);
+    let mut history = History::default();
+    for row in readings {
+        let mut values = [None; CHANNELS_MAX];
+        for ((slot, value), predicted) in values.iter_mut().zip(row).zip(predicted) {
+            *slot = value.map(|value| predicted + value);
+        }
+        history.push(Observation {
+            dt_s: BLOCK_S,
+            values,
+            moving: true,
+            ..Observation::default()
+        });
+        window.push(&history, &commands(&history), (1.0, 0));
+    }
+    window
+}
+
+#[test]
+fn a_step_is_the_mean_of_the_newest_blocks_less_that_of_those_before() {
+    let rows = [
+        [Some(1.0), None],
+        [Some(0.0), None],
+        [Some(2.0), None],
+        [Some(1.0), None],
+        [Some(5.0), Some(1.0)],
+        [Some(3.0), Some(2.0)],
+    ];
+    let seen = Seen {
+        channels: 2,
+        has_pose: false,
+    };
+    let found = steps(&window([0.0; 2], &rows), seen);
+    // Six blocks: the oldest ages have fewer than two before them, the second channel none at all.
+    let unit = |newest: f64, before: f64| 1.0 / (1.0 / newest + 1.0 / before).sqrt();
+    let second = [1.0 * unit(1.0, 5.0), 0.0, 0.0, 0.0];
+    let means = [(3.0, 9.0 / 5.0), (4.0, 1.0), (3.0, 1.0), (11.0 / 4.0, 0.5)];
+    for (age, (newer, older)) in means.into_iter().enumerate() {
+        let (newest, before) = ((age + 1) as f64, (5 - age) as f64);
+        let step = found[age].unwrap();
+        let expected = unit(newest, before) * (newer - older);
+        assert!((step[0] - expected).abs() < 1e-12, "{age}: {}", step[0]);
+        assert!((step[1] - second[age]).abs() < 1e-12, "{age}: {}", step[1]);
+    }
+    let found = steps(&window([0.0; 2], &rows[..4]), seen);
+    let there = found.map(|step| step.is_some());
+    assert_eq!(there, [true, true, false, false]);
+    assert_eq!(steps(&window([0.0; 2], &rows[..2]), seen), [None; AGES]);
+}
+
+#[test]
+fn the_velocity_of_a_pose_steps_along_and_across_its_way() {
+    let rows = [[Some(0.0); 2], [Some(0.0); 2], [Some(1.0), Some(2.0)]];
+    let seen = Seen {
+        channels: 2,
+        has_pose: true,
+    };
+    let unit = 1.0 / 1.5_f64.sqrt();
+    for (way, expected) in [
+        ([10.0, 0.0], [1.0, 2.0]),
+        ([0.0, 10.0], [2.0, -1.0]),
+        ([-10.0, 0.0], [-1.0, -2.0]),
+        // Hardly moving: as it is.
+        ([0.0, 0.5], [1.0, 2.0]),
+    ] {
+        let step = steps(&window(way, &rows), seen)[0].unwrap();
+        for (found, expected) in step.into_iter().zip(expected) {
+            assert!((found - unit * expected).abs() < 1e-9, "{way:?}: {step:?}");
+        }
+    }
 }
