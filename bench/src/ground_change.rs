@@ -46,11 +46,13 @@ pub enum Kind {
 
 /// A run, its label and what was told of it.
 #[derive(Debug, Clone, Serialize)]
-pub struct Found {
+pub struct JudgedRun {
     /// Name of its file.
     pub name: String,
     /// What it shows.
     pub kind: Kind,
+    /// When wheels cross the border, s.
+    pub crossings_s: Vec<f64>,
     /// True for one of the twenty runs on one ground.
     pub is_chosen: bool,
     /// Changes that were told: when they came, s.
@@ -66,6 +68,7 @@ struct Labelled {
     name: String,
     ground: String,
     kind: Kind,
+    crossings_s: Vec<f64>,
     heading: u32,
     is_chosen: bool,
 }
@@ -74,7 +77,7 @@ struct Labelled {
 ///
 /// # Errors
 /// A log that is missing or supports no model.
-pub fn found() -> Result<Vec<Found>, Box<dyn Error>> {
+pub fn found() -> Result<Vec<JudgedRun>, Box<dyn Error>> {
     let log = logs::log("robotino_slip", "robotino")?;
     let clear = clear()?;
     let mut all: Vec<Labelled> = log
@@ -125,12 +128,11 @@ fn labelled(
     let is_clear = clear
         .iter()
         .any(|(file, z)| name.ends_with(file.as_str()) && *z > CLEAR);
-    let kind = match border {
-        None => Kind::Still,
-        Some((_, line)) => match first_crossing_s(&run, robot, *line).filter(|_| is_clear) {
-            Some(t_s) => Kind::Crosses(t_s),
-            None => Kind::Unclear,
-        },
+    let crossings_s = border.map_or_else(Vec::new, |(_, line)| crossings_s(&run, robot, *line));
+    let kind = match (border, crossings_s.first()) {
+        (None, _) => Kind::Still,
+        (Some(_), Some(first_s)) if is_clear => Kind::Crosses(*first_s),
+        (Some(_), _) => Kind::Unclear,
     };
     let heading = run.frames.first().map_or(0, heading);
     Labelled {
@@ -138,6 +140,7 @@ fn labelled(
         name,
         ground,
         kind,
+        crossings_s,
         heading,
         is_chosen: false,
     }
@@ -150,14 +153,15 @@ fn heading(frame: &SensorFrame) -> u32 {
     (degrees / HEADING_DEG).round() as u32 % places * HEADING_DEG as u32
 }
 
-/// When the first wheel crosses a border, s.
-fn first_crossing_s(run: &Run, robot: &Description, line: f64) -> Option<f64> {
+/// When wheels cross a border, s, in order.
+fn crossings_s(run: &Run, robot: &Description, line: f64) -> Vec<f64> {
     let map = ChannelMap::new(robot);
     let frames = run.frames.iter();
     let poses: Vec<(f64, [f64; 3])> = frames
         .filter_map(|frame| Some((frame.header.t_capture_ns as f64 * 1e-9, map.pose(frame)?)))
         .collect();
-    let crossing = |wheel: &vigil_robot::description::Wheel| {
+    let mut out = Vec::new();
+    for wheel in &robot.wheels {
         let beyond = poses
             .iter()
             .map(|(_, [_, y, yaw])| y + wheel.x * yaw.sin() + wheel.y * yaw.cos() - line);
@@ -169,11 +173,11 @@ fn first_crossing_s(run: &Run, robot: &Description, line: f64) -> Option<f64> {
             );
             beyond[from..to].iter().sum::<f64>() > 0.0
         };
-        let place = (1..beyond.len()).find(|&i| side(i) != side(i - 1))?;
-        Some(poses[place].0)
-    };
-    let crossings = robot.wheels.iter().filter_map(crossing);
-    crossings.min_by(f64::total_cmp)
+        let crosses = (1..beyond.len()).filter(|&i| side(i) != side(i - 1));
+        out.extend(crosses.map(|i| poses[i].0));
+    }
+    out.sort_by(f64::total_cmp);
+    out
 }
 
 /// Chooses the runs on one ground that are judged beside those that cross.
@@ -192,7 +196,7 @@ fn choose(all: &mut [Labelled]) {
     }
 }
 
-fn fold(all: &[Labelled], heading: u32, robot: &Description) -> Result<Vec<Found>, String> {
+fn fold(all: &[Labelled], heading: u32, robot: &Description) -> Result<Vec<JudgedRun>, String> {
     let (left_out, others): (Vec<&Labelled>, Vec<&Labelled>) =
         all.iter().partition(|one| one.heading == heading);
     let healthy: Vec<Run> = others.iter().map(|one| one.run.clone()).collect();
@@ -226,7 +230,7 @@ fn fold(all: &[Labelled], heading: u32, robot: &Description) -> Result<Vec<Found
     judged.collect()
 }
 
-fn judged(one: &Labelled, model: &Model, robot: &Description) -> Result<Found, String> {
+fn judged(one: &Labelled, model: &Model, robot: &Description) -> Result<JudgedRun, String> {
     let settings = Settings {
         false_alarm_interval_h: INTERVAL_H,
         ..Settings::default()
@@ -244,9 +248,10 @@ fn judged(one: &Labelled, model: &Model, robot: &Description) -> Result<Found, S
             told_s.push(frame.header.t_capture_ns as f64 * 1e-9);
         }
     }
-    Ok(Found {
+    Ok(JudgedRun {
         name: one.name.clone(),
         kind: one.kind.clone(),
+        crossings_s: one.crossings_s.clone(),
         is_chosen: one.is_chosen,
         changes_s,
         told_s,
@@ -254,61 +259,81 @@ fn judged(one: &Labelled, model: &Model, robot: &Description) -> Result<Found, S
     })
 }
 
+/// Changes told after the first of a run that crosses: how many come with another wheel, of how
+/// many.
+fn later(found: &[JudgedRun]) -> (usize, usize) {
+    let (mut of_wheels, mut all) = (0, 0);
+    let crossing = found.iter();
+    for one in crossing.filter(|one| matches!(one.kind, Kind::Crosses(_))) {
+        for t_s in one.changes_s.iter().skip(1) {
+            let mut crossings_s = one.crossings_s.iter();
+            let is_near = crossings_s.any(|crossing_s| (t_s - crossing_s).abs() <= TOLD_S);
+            of_wheels += usize::from(is_near);
+            all += 1;
+        }
+    }
+    (of_wheels, all)
+}
+
 /// How many runs of how many.
 pub type Count = (&'static str, usize, usize);
 
 /// What was told, a count for each quantity.
 #[must_use]
-pub fn counts(found: &[Found]) -> Vec<Count> {
-    let crossing: Vec<(&Found, f64)> = found
+pub fn counts(found: &[JudgedRun]) -> Vec<Count> {
+    let crossing: Vec<(&JudgedRun, f64)> = found
         .iter()
         .filter_map(|one| match one.kind {
             Kind::Crosses(onset_s) => Some((one, onset_s)),
             Kind::Unclear | Kind::Still => None,
         })
         .collect();
-    let of = |holds: &dyn Fn(&Found, f64) -> bool| {
+    let of = |holds: &dyn Fn(&JudgedRun, f64) -> bool| {
         let right = crossing
             .iter()
             .filter(|(one, onset_s)| holds(one, *onset_s));
         (right.count(), crossing.len())
     };
-    let near = |one: &Found, onset_s: f64| {
+    let near = |one: &JudgedRun, onset_s: f64| {
         let near = one
             .changes_s
             .iter()
             .filter(|t_s| (**t_s - onset_s).abs() <= TOLD_S);
         near.count()
     };
-    let first = |one: &Found, onset_s: f64| {
+    let first = |one: &JudgedRun, onset_s: f64| {
         let first = one.changes_s.first();
         first.is_some_and(|t_s| (t_s - onset_s).abs() <= TOLD_S) && near(one, onset_s) == 1
     };
-    let alone = |one: &Found, onset_s: f64| first(one, onset_s) && one.changes_s.len() == 1;
-    let early = |one: &Found, onset_s: f64| {
+    let alone = |one: &JudgedRun, onset_s: f64| first(one, onset_s) && one.changes_s.len() == 1;
+    let early = |one: &JudgedRun, onset_s: f64| {
         let first = one.changes_s.first();
         first.is_some_and(|t_s| *t_s < onset_s - TOLD_S)
     };
-    let still = |is_of: &dyn Fn(&Found) -> bool| {
-        let all: Vec<&Found> = found
+    let still = |is_of: &dyn Fn(&JudgedRun) -> bool| {
+        let all: Vec<&JudgedRun> = found
             .iter()
             .filter(|one| one.kind == Kind::Still && is_of(one))
             .collect();
         let told = all.iter().filter(|one| !one.changes_s.is_empty()).count();
         (told, all.len())
     };
-    let alarms = |is_of: &dyn Fn(&Found) -> bool| {
-        let all: Vec<&Found> = found.iter().filter(|one| is_of(one)).collect();
+    let alarms = |is_of: &dyn Fn(&JudgedRun) -> bool| {
+        let all: Vec<&JudgedRun> = found.iter().filter(|one| is_of(one)).collect();
         (all.iter().filter(|one| one.alarms > 0).count(), all.len())
     };
-    let is_judged = |one: &Found| one.is_chosen || matches!(one.kind, Kind::Crosses(_));
-    let all: [(&'static str, (usize, usize)); 7] = [
+    let is_judged = |one: &JudgedRun| one.is_chosen || matches!(one.kind, Kind::Crosses(_));
+    let all: [(&'static str, (usize, usize)); 8] = [
         (
             "crossings: the first change told within 1 s, no second one there",
             of(&first),
         ),
         ("... and none beside it in the run", of(&alone)),
         ("crossings: a change told more than 1 s before", of(&early)),
+        (
+            "changes told after the first: within 1 s of another wheel's crossing",
+            later(found),
+        ),
         (
             "twenty runs on one ground: a change told",
             still(&|one| one.is_chosen),
@@ -324,11 +349,12 @@ pub fn counts(found: &[Found]) -> Vec<Count> {
 mod tests {
     use super::*;
 
-    fn run(kind: Kind, changes_s: &[f64], alarms: u32) -> Found {
-        Found {
+    fn run(kind: Kind, changes_s: &[f64], alarms: u32) -> JudgedRun {
+        JudgedRun {
             name: String::new(),
             is_chosen: kind == Kind::Still,
             kind,
+            crossings_s: vec![5.0, 9.5],
             changes_s: changes_s.to_vec(),
             told_s: changes_s.to_vec(),
             alarms,
@@ -339,7 +365,7 @@ mod tests {
     fn a_crossing_is_right_if_its_first_change_is_near_and_the_only_one_there() {
         let found = [
             run(Kind::Crosses(5.0), &[5.5], 0),
-            run(Kind::Crosses(5.0), &[4.5, 9.0], 0),
+            run(Kind::Crosses(5.0), &[4.5, 12.0], 0),
             run(Kind::Crosses(5.0), &[4.5, 5.5], 1),
             run(Kind::Crosses(5.0), &[3.0, 5.0], 0),
             run(Kind::Crosses(5.0), &[], 0),
@@ -350,7 +376,16 @@ mod tests {
         let counts: Vec<[usize; 2]> = counts.collect();
         assert_eq!(
             counts,
-            [[2, 5], [1, 5], [1, 5], [1, 2], [1, 2], [1, 7], [1, 7]]
+            [
+                [2, 5],
+                [1, 5],
+                [1, 5],
+                [2, 3],
+                [1, 2],
+                [1, 2],
+                [1, 7],
+                [1, 7]
+            ]
         );
     }
 }

@@ -208,7 +208,7 @@ fn unfit_contexts(
 /// What a name has.
 const LETTERS: &str = "letters, digits, _ and -";
 
-fn is_word(word: &String) -> bool {
+fn is_word(word: &str) -> bool {
     let is_letter = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     !word.is_empty() && word.chars().all(is_letter)
 }

@@ -40,14 +40,14 @@ pub type Steps = [Option<Step>; AGES];
 
 /// What of a window is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Seen {
+pub struct StepChannels {
     /// Its channels.
     pub channels: usize,
     /// True if the first two are the velocity of a pose, forward and to the left.
     pub has_pose: bool,
 }
 
-impl Seen {
+impl StepChannels {
     /// All channels of a robot.
     #[must_use]
     pub fn of_robot(robot: &Description) -> Self {
@@ -64,7 +64,7 @@ impl Seen {
 /// of unit variance. A channel that is missing on one side shows none. The velocity of a pose is
 /// taken along and across the way that it was to go in the newest blocks.
 #[must_use]
-pub fn steps(window: &Window, seen: Seen) -> Steps {
+pub fn steps(window: &Window, seen: StepChannels) -> Steps {
     let whole = window.whole_blocks().min(BLOCKS);
     std::array::from_fn(|age| {
         let newest = age + 1;
@@ -232,7 +232,7 @@ pub struct ToldChange {
 pub struct ChangeWatch {
     /// With their places in the description.
     watched: Vec<(usize, ContextChange)>,
-    seen: Seen,
+    seen: StepChannels,
     /// Time for which none is told yet, s.
     wait_s: f64,
     count: u32,
@@ -249,7 +249,7 @@ impl ChangeWatch {
         let watched = watched.filter_map(|one| Some((place(one)?, one.clone())));
         Self {
             watched: watched.collect(),
-            seen: Seen::of_robot(robot),
+            seen: StepChannels::of_robot(robot),
             wait_s: 0.0,
             count: 0,
             last: None,

@@ -8,8 +8,8 @@ use super::coverage::{Combinations, Range, widening};
 use super::fault_kind::FaultKind;
 use super::identity::{Identity, without_groups};
 use super::law::{Direction, Law};
-use super::model_check::{check_channel, check_scatter, check_tail};
-use super::observation::{DEPTH, History};
+use super::model_check::{check_channel, check_scatter};
+use super::observation::History;
 use super::scatter::Scatter;
 use super::signature::Signatures;
 use super::turning::TurningSignatures;
@@ -29,19 +29,10 @@ pub const VERSION: u32 = 3;
 pub const KIND: &str = "channels";
 /// Prior fault rate at which log-odds are collected and tempered, 1/h.
 pub const FAULT_RATE_1_H: f64 = 1.0;
-/// Largest weight of a term.
-pub(super) const WEIGHT_MAX: f64 = 1e9;
 /// Time at rest from which on a robot at rest is known, s.
 const REST_MIN_S: f64 = 3.0;
-/// Terms of a channel. Of four axes to the fourth order learning makes 70 products, 32 lagged axes,
-/// 32 smoothed ones and 8 senses. Smaller refuses such a model; larger only lets a file cost more
-/// time.
-pub(super) const TERMS_MAX: usize = 160;
-/// Largest order of a polynomial.
-pub(super) const ORDER_MAX: u32 = 4;
 // `Model::check` names these in its messages as numbers.
 const _: () = assert!(AXES == 4 && CHANNELS_MAX == 28 && DRIVES_MAX == 8);
-const _: () = assert!(TERMS_MAX == 160 && DEPTH == 9 && ORDER_MAX == 4);
 
 /// Faults whose log-odds behave alike without a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -422,4 +413,12 @@ fn check_declared(
             refuse(format!("{key}.{i}.{of}"), names[i], &allowed)
         }
     }
+}
+
+/// Checks the numbers of a tail.
+fn check_tail(tail: &Tail) -> Result<(), ModelError> {
+    let key = |name: &str| format!("tail.{}.{:?}.{name}", tail.sensors, tail.class);
+    check_range(&key("level_log_odds"), tail.level_log_odds, -1e4, 1e4)?;
+    check_range(&key("interval_h"), tail.interval_h, 1e-9, 1e9)?;
+    check_range(&key("slope"), tail.slope, 1e-3, 10.0)
 }

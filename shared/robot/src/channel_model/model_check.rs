@@ -2,11 +2,21 @@
 
 use super::DRIVES_MAX;
 use super::channel::{Channel, Regressor, Term};
-use super::model::{ORDER_MAX, TERMS_MAX, Tail, WEIGHT_MAX};
 use super::observation::{DEPTH, SMOOTHING_S};
 use super::scatter::{Scatter, ScatterLaw};
 use crate::learned::model::ModelError;
-use crate::model_file::{check_range, refuse};
+use crate::model_file::refuse;
+
+/// Largest weight of a term.
+const WEIGHT_MAX: f64 = 1e9;
+/// Terms of a channel. Of four axes to the fourth order learning makes 70 products, 32 lagged axes,
+/// 32 smoothed ones and 8 senses. Smaller refuses such a model; larger only lets a file cost more
+/// time.
+const TERMS_MAX: usize = 160;
+/// Largest order of a polynomial.
+const ORDER_MAX: u32 = 4;
+// The messages name these as numbers.
+const _: () = assert!(TERMS_MAX == 160 && DEPTH == 9 && ORDER_MAX == 4);
 
 /// Checks the numbers of a channel; `axes`: how many there are.
 pub(super) fn check_channel(key: &str, channel: &Channel, axes: usize) -> Result<(), ModelError> {
@@ -63,14 +73,6 @@ pub(super) fn check_scatter(scatter: &Scatter, channels: usize) -> Result<(), Mo
         found,
         "a mean for each channel and a covariance, all up to 1e6, each variance from 1e-6",
     )
-}
-
-/// Checks the numbers of a tail.
-pub(super) fn check_tail(tail: &Tail) -> Result<(), ModelError> {
-    let key = |name: &str| format!("tail.{}.{:?}.{name}", tail.sensors, tail.class);
-    check_range(&key("level_log_odds"), tail.level_log_odds, -1e4, 1e4)?;
-    check_range(&key("interval_h"), tail.interval_h, 1e-9, 1e9)?;
-    check_range(&key("slope"), tail.slope, 1e-3, 10.0)
 }
 
 /// Checks that a term points at what exists.

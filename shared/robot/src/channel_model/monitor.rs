@@ -150,9 +150,7 @@ impl Monitor {
             signatures: &model.signatures,
             turning: &model.turning,
         });
-        // They are of all channels, as all that is taught.
-        let learned = taught.map(|_| &model.contexts);
-        let changes = ChangeWatch::new(robot, learned);
+        let changes = ChangeWatch::new(robot, taught.map(|_| &model.contexts));
         let declared = DeclaredFaults::new(robot, &targets, &laws.mean, taught);
         let watched = watched(at, &sensed, &declared);
         let tail = |class: Class| model.tail(channels, class).cloned();
@@ -252,8 +250,7 @@ impl Monitor {
             .window_mut()
             .push(history, &commands(history), (widening, self.suspects));
         if now.moving {
-            let (window, t_ns) = (self.bank.window(), now.t_ns);
-            self.changes.take(window, t_ns, now.dt_s);
+            self.changes.take(self.bank.window(), now.t_ns, now.dt_s);
         }
         let places = &self.places;
         let measured = |channel: usize| now.values[places[channel]].is_some();

@@ -63,7 +63,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     for (done, run) in runs.iter().enumerate() {
         progress.show(done);
         let mut stages = initial.begin()?;
-        let mut told = Told::default();
+        let mut told = ToldCount::default();
         for frame in &run.frames {
             stages.take(frame);
             let context = told.take(stages.detection(), robot);
@@ -79,11 +79,11 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 
 /// Changes that are no fault, told so far.
 #[derive(Debug, Default)]
-struct Told {
+struct ToldCount {
     count: u32,
 }
 
-impl Told {
+impl ToldCount {
     /// Name of a change that is told now; empty without one.
     fn take(&mut self, belief: &DetectionBelief, robot: &Description) -> String {
         let before = std::mem::replace(&mut self.count, belief.context_count);

@@ -12,8 +12,8 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::Serialize;
 use vigil_robot::Description;
 use vigil_robot::channel_model::context_change::{
-    AGES, ChangeAge, ContextChange, ContextChanges, DIRECTIONS_MAX, Seen, Step, StepDirection,
-    Steps, WAIT_S, steps,
+    AGES, ChangeAge, ContextChange, ContextChanges, DIRECTIONS_MAX, Step, StepChannels,
+    StepDirection, Steps, WAIT_S, steps,
 };
 use vigil_robot::channel_model::law::BLOCK_S;
 use vigil_robot::channel_model::{Model, Scales};
@@ -138,7 +138,7 @@ pub(super) fn fit(
         return Vec::new();
     }
     let channels = model.channel.len();
-    let stretches = stretches(models, records, scales, Seen::of_robot(robot));
+    let stretches = stretches(models, records, scales, StepChannels::of_robot(robot));
     let mut told = Vec::new();
     for context in &robot.context {
         let shown = (0..channels).filter(|&i| {
@@ -180,7 +180,12 @@ pub(super) fn fit(
 }
 
 /// The windows of motion, each seen through the model that has not seen it.
-fn stretches(models: &[Model], records: &[Record], scales: &Scales, seen: Seen) -> Vec<Stretch> {
+fn stretches(
+    models: &[Model],
+    records: &[Record],
+    scales: &Scales,
+    seen: StepChannels,
+) -> Vec<Stretch> {
     let mut out: Vec<Stretch> = Vec::new();
     let mut part = None;
     unseen::windows(models, records, scales, |sight| {
@@ -271,7 +276,7 @@ impl<'a> Health<'a> {
         })
     }
 
-    fn of(&self, one: &Labelled<'_>) -> impl Iterator<Item = &'a Stretch> {
+    fn stretches_of(&self, one: &Labelled<'_>) -> impl Iterator<Item = &'a Stretch> {
         let (record, stretches) = (one.record, self.stretches);
         stretches
             .iter()
@@ -281,7 +286,7 @@ impl<'a> Health<'a> {
     /// The steps that a labelled change leaves at an age.
     fn steps_at(&self, one: &Labelled<'_>, age: usize) -> Vec<DVector<f64>> {
         let at_s = one.label.onset_s + (age + 1) as f64 * BLOCK_S;
-        let moments = self.of(one).flat_map(|stretch| &stretch.moments);
+        let moments = self.stretches_of(one).flat_map(|stretch| &stretch.moments);
         let near = moments.filter(|moment| (moment.t_s - at_s).abs() <= 0.5 * BLOCK_S);
         let steps = near.filter_map(|moment| moment.steps[age].as_ref());
         steps.map(|step| vector(step, &self.shown)).collect()
@@ -396,7 +401,7 @@ impl<'a> Health<'a> {
 
     /// True if the first change that is told of a run is the labelled one.
     fn is_told(&self, change: &ContextChange, one: &Labelled<'_>) -> bool {
-        let moments = self.of(one).flat_map(|stretch| &stretch.moments);
+        let moments = self.stretches_of(one).flat_map(|stretch| &stretch.moments);
         let mut events = moments.filter_map(|moment| {
             let (ratio, age) = change.log_ratio(&moment.steps)?;
             (ratio > change.threshold).then_some(moment.t_s - age as f64 * BLOCK_S)

@@ -198,7 +198,7 @@ fn a_step_is_the_mean_of_the_newest_blocks_less_that_of_those_before() {
         [Some(5.0), Some(1.0)],
         [Some(3.0), Some(2.0)],
     ];
-    let seen = Seen {
+    let seen = StepChannels {
         channels: 2,
         has_pose: false,
     };
@@ -223,7 +223,7 @@ fn a_step_is_the_mean_of_the_newest_blocks_less_that_of_those_before() {
 #[test]
 fn the_velocity_of_a_pose_steps_along_and_across_its_way() {
     let rows = [[Some(0.0); 2], [Some(0.0); 2], [Some(1.0), Some(2.0)]];
-    let seen = Seen {
+    let seen = StepChannels {
         channels: 2,
         has_pose: true,
     };
