@@ -245,8 +245,8 @@ VIGIL_ASSERT(offsetof(vigil_sensor_frame, command) == 104);
 VIGIL_ASSERT(offsetof(vigil_sensor_frame, channel) == 168);
 VIGIL_ASSERT(offsetof(vigil_sensor_frame, planned_pose) == 552);
 
-#define VIGIL_DETECTION_BELIEF_SCHEMA 0xe98dc1e4b698e1c9ull
-#define VIGIL_DETECTION_BELIEF_TYPE_NAME "vigil.DetectionBelief.v1.e98dc1e4b698e1c9"
+#define VIGIL_DETECTION_BELIEF_SCHEMA 0xaa8cf898b07dabd6ull
+#define VIGIL_DETECTION_BELIEF_TYPE_NAME "vigil.DetectionBelief.v1.aa8cf898b07dabd6"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -296,8 +296,14 @@ typedef struct {
   uint32_t blind;
   /* Whether an alarm could rise now: a Readiness. */
   uint32_t readiness;
+  /* When the last change came that is no fault, capture time, ns; 0 before the first one. */
+  uint64_t context_t_capture_ns;
+  /* Such changes told so far. */
+  uint32_t context_count;
+  /* Which of the description's contexts the last one was, from 0. */
+  uint32_t context;
 } vigil_detection_belief;
-VIGIL_ASSERT(sizeof(vigil_detection_belief) == 864);
+VIGIL_ASSERT(sizeof(vigil_detection_belief) == 880);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, cause) == 48);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, run_id) == 72);
@@ -322,6 +328,9 @@ VIGIL_ASSERT(offsetof(vigil_detection_belief, degenerate_count) == 848);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, action_outcome) == 852);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, blind) == 856);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, readiness) == 860);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, context_t_capture_ns) == 864);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, context_count) == 872);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, context) == 876);
 
 #define VIGIL_PARTICLE_BLOCK_SCHEMA 0x60e41525a1aef4b2ull
 #define VIGIL_PARTICLE_BLOCK_TYPE_NAME "vigil.ParticleBlock.v1.60e41525a1aef4b2"

@@ -268,8 +268,8 @@ assert SensorFrame.planned_pose.offset == 552
 
 
 class DetectionBelief(ctypes.LittleEndianStructure):
-    SCHEMA = 0xE98DC1E4B698E1C9
-    TYPE_NAME = "vigil.DetectionBelief.v1.e98dc1e4b698e1c9"
+    SCHEMA = 0xAA8CF898B07DABD6
+    TYPE_NAME = "vigil.DetectionBelief.v1.aa8cf898b07dabd6"
 
     @staticmethod
     def type_name():
@@ -324,10 +324,16 @@ class DetectionBelief(ctypes.LittleEndianStructure):
         ("blind", ctypes.c_uint32),
         # Whether an alarm could rise now: a Readiness.
         ("readiness", ctypes.c_uint32),
+        # When the last change came that is no fault, capture time, ns; 0 before the first one.
+        ("context_t_capture_ns", ctypes.c_uint64),
+        # Such changes told so far.
+        ("context_count", ctypes.c_uint32),
+        # Which of the description's contexts the last one was, from 0.
+        ("context", ctypes.c_uint32),
     ]
 
 
-assert ctypes.sizeof(DetectionBelief) == 864
+assert ctypes.sizeof(DetectionBelief) == 880
 assert DetectionBelief.header.offset == 0
 assert DetectionBelief.cause.offset == 48
 assert DetectionBelief.run_id.offset == 72
@@ -352,6 +358,9 @@ assert DetectionBelief.degenerate_count.offset == 848
 assert DetectionBelief.action_outcome.offset == 852
 assert DetectionBelief.blind.offset == 856
 assert DetectionBelief.readiness.offset == 860
+assert DetectionBelief.context_t_capture_ns.offset == 864
+assert DetectionBelief.context_count.offset == 872
+assert DetectionBelief.context.offset == 876
 
 
 class ParticleBlock(ctypes.LittleEndianStructure):

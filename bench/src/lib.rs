@@ -9,6 +9,7 @@ use vigil_setup::{Setup, SetupError, load_graph};
 pub mod archive;
 pub mod chain;
 pub mod field;
+pub mod ground_change;
 pub mod latency;
 pub mod machine;
 pub mod missions;

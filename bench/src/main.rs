@@ -36,6 +36,8 @@ enum Question {
     Field(field::Args),
     /// How long from a clone to the first alarm, packages downloaded?
     FirstMinute,
+    /// Is another ground under a real robot told, and told as no fault?
+    GroundChange,
     /// Records healthy runs of the simulated rover, every channel in them, for
     /// `vigil learn --more`.
     Healthy(healthy::Args),
@@ -80,6 +82,7 @@ impl Question {
             Self::Bits(args) => bits::run(args),
             Self::Field(args) => field::run(args),
             Self::FirstMinute => first_minute::run(),
+            Self::GroundChange => ground_change::run(),
             Self::Healthy(args) => healthy::run(args),
             Self::Instructions(args) => instructions::run(args),
             Self::Latency(args) => latency::run(args),

@@ -3,6 +3,7 @@
 pub mod bits;
 pub mod field;
 pub mod first_minute;
+pub mod ground_change;
 pub mod healthy;
 pub mod instructions;
 pub mod latency;

@@ -18,6 +18,8 @@ pub struct Log {
     pub robot: Description,
     /// Its runs.
     pub runs: Vec<Run>,
+    /// Their names: of the file or folder, from the archive's.
+    pub names: Vec<String>,
 }
 
 /// Unpacks `$VIGIL_DATA/real/<archive>.tar.xz` below the build folder and imports it by
@@ -35,6 +37,7 @@ pub fn log(archive: &str, log: &str) -> Result<Log, Box<dyn Error>> {
         eprintln!("{log}: {channel} is late by {delay_s:.3} s");
     }
     Ok(Log {
+        names: imported.runs.iter().map(|run| run.name.clone()).collect(),
         runs: imported.frames(&robot),
         robot,
     })
@@ -44,7 +47,7 @@ pub fn log(archive: &str, log: &str) -> Result<Log, Box<dyn Error>> {
 ///
 /// # Errors
 /// What is missing or malformed.
-pub(super) fn unpacked(archive: &str) -> Result<PathBuf, Box<dyn Error>> {
+pub fn unpacked(archive: &str) -> Result<PathBuf, Box<dyn Error>> {
     let data = std::env::var("VIGIL_DATA").map_err(
         |_| "VIGIL_DATA is not set: the folder that holds real/kobuki_wheel_fault.tar.xz",
     )?;

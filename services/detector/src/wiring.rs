@@ -29,6 +29,31 @@ pub struct DetectorStage {
     symptoms: u32,
     symptoms_reported: u32,
     sight: SightReport,
+    context: ContextReport,
+}
+
+/// The last change that is no fault, and how many the timeline has.
+#[derive(Debug, Clone, Copy, Default)]
+struct ContextReport {
+    count: u32,
+    reported: u32,
+    context: u32,
+    t_capture_ns: u64,
+}
+
+impl ContextReport {
+    const fn take(&mut self, belief: &DetectionBelief) {
+        self.count = belief.context_count;
+        (self.context, self.t_capture_ns) = (belief.context, belief.context_t_capture_ns);
+    }
+
+    fn report(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        if self.count != self.reported {
+            let (kind, t_ns) = (EventKind::ContextChanged, self.t_capture_ns);
+            health.event(now_ns, kind, self.context, 0.0, t_ns);
+            self.reported = self.count;
+        }
+    }
 }
 
 /// Blindness and readiness of the last belief, and what the timeline has of them.
@@ -100,6 +125,7 @@ impl DetectorStage {
             symptoms: 0,
             symptoms_reported: 0,
             sight: SightReport::default(),
+            context: ContextReport::default(),
         })
     }
 }
@@ -137,6 +163,7 @@ impl Stage for DetectorStage {
         belief.cause = cause;
         (self.alarm, self.p_fault) = (belief.alarm != 0, belief.p_fault);
         self.symptoms = belief.symptoms;
+        self.context.take(belief);
         (self.sight.blind, self.sight.readiness) = (belief.blind, belief.readiness);
         self.hypotheses.block().cause = cause;
         // Hypotheses first: they are there when the belief wakes the identifier.
@@ -159,6 +186,7 @@ impl Stage for DetectorStage {
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         self.sight.report(health, now_ns);
+        self.context.report(health, now_ns);
         for finding in self.detector.findings().into_iter().flatten() {
             let what = finding.to_wire();
             health.event(now_ns, EventKind::Publisher, what, finding.value, 0);

@@ -345,6 +345,10 @@ impl Namer {
             },
             EventKind::Run => event.value.to_string(),
             EventKind::Symptoms => words::symptoms(event.what),
+            EventKind::ContextChanged => {
+                let context = self.robot.context.get(event.what as usize);
+                context.map_or_else(|| "?".into(), |context| context.name.clone())
+            }
             EventKind::Outcome => words::outcome(event),
             EventKind::Degraded => words::degraded(event.what),
             EventKind::Rejected => {

@@ -25,7 +25,7 @@ impl Evidence {
 
 block! {
     /// Written by the detector every cycle.
-    pub struct DetectionBelief, size 864 {
+    pub struct DetectionBelief, size 880 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -75,6 +75,12 @@ block! {
         pub blind: u32,
         /// Whether an alarm could rise now: a [`Readiness`].
         pub readiness: u32,
+        /// When the last change came that is no fault, capture time, ns; 0 before the first one.
+        pub context_t_capture_ns: u64,
+        /// Such changes told so far.
+        pub context_count: u32,
+        /// Which of the description's contexts the last one was, from 0.
+        pub context: u32,
     }
 }
 

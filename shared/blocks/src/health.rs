@@ -112,6 +112,9 @@ pub enum EventKind {
     /// An assertion of the service has failed and ended it. Only the launcher records it: no block
     /// carries its text.
     Assertion = 34,
+    /// What is no fault has changed, as the ground does. `what`: the description's context, from 0;
+    /// `value`: capture time of the change, ns.
+    ContextChanged = 35,
 }
 
 impl EventKind {

@@ -8,6 +8,7 @@ use vigil_inference::track::MotionNoise;
 use crate::body::Body;
 use crate::channel_table::FurtherChannel;
 use crate::chassis::{Ground, Motor, RockerBogie};
+use crate::context_table::{CONTEXTS_MAX, DeclaredContext};
 use crate::fault_prior::FaultPrior;
 use crate::fault_table::{DECLARED_MAX, DeclaredFault};
 use crate::tolerance::Tolerance;
@@ -184,6 +185,10 @@ pub struct Description {
     #[serde(default)]
     #[schemars(length(max = DECLARED_MAX))]
     pub fault: Vec<DeclaredFault>,
+    /// Changes that are no fault, as of the ground; only of a robot with a model of channels.
+    #[serde(default)]
+    #[schemars(length(max = CONTEXTS_MAX))]
+    pub context: Vec<DeclaredContext>,
     /// Order of the polynomials of the command in a model of channels.
     #[serde(default = "four")]
     #[schemars(range(min = 1, max = 4))]

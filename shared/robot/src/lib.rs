@@ -8,6 +8,7 @@ pub mod channel_model;
 mod channel_odds;
 pub mod channel_table;
 pub mod chassis;
+pub mod context_table;
 pub mod declared;
 pub mod description;
 pub mod disturbance;

@@ -229,8 +229,13 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
     }
     command(robot, &mut report);
     let channels = match robot.has_fault_models() {
-        true if robot.fault.is_empty() => None,
-        true => Some("an ackermann6 has no [[fault]]: its faults are modelled".to_owned()),
+        true if !robot.fault.is_empty() => {
+            Some("an ackermann6 has no [[fault]]: its faults are modelled".to_owned())
+        }
+        true if !robot.context.is_empty() => {
+            Some("an ackermann6 has no [[context]]: its slip and drag are tracked".to_owned())
+        }
+        true => None,
         false => unfit(robot),
     };
     if let Some(message) = channels {

@@ -1,3 +1,5 @@
+use vigil_robot::context_table::DeclaredContext;
+
 use super::*;
 use crate::plan::tests::plan;
 
@@ -128,4 +130,33 @@ fn blind_time_is_added_up_by_cause_until_the_end() {
     let expected = BTreeMap::from([("clock", 1.0 + 2.0), ("silence", 2.0)]);
     assert_eq!(blind_s(events.iter(), 8_000_000_000), expected);
     assert_eq!(blind_s(events[3..4].iter(), 8_000_000_000), BTreeMap::new());
+}
+
+#[test]
+fn a_change_that_is_no_fault_is_told_by_its_name() {
+    let mut setup = plan(&[]).unwrap().setup;
+    setup.robot.context = ["load", "ground"]
+        .map(|name| DeclaredContext {
+            name: name.to_owned(),
+            shows: Vec::new(),
+        })
+        .to_vec();
+    let mut timeline = Timeline::new(&setup);
+    timeline.begin(10 * S);
+    let kind = EventKind::ContextChanged;
+    timeline.add(ServiceName::Detector, &event(12, kind, 1, 11 * S));
+    timeline.add(ServiceName::Detector, &event(13, kind, 7, 11 * S));
+    let entries = timeline.entries();
+    let lines: Vec<String> = entries.iter().map(ToString::to_string).collect();
+    assert_eq!(
+        lines,
+        [
+            "    2.000 s  detector    context-changed  ground",
+            "    3.000 s  detector    context-changed  ?",
+        ]
+    );
+    let json = serde_json::to_value(&entries[0]).unwrap();
+    assert_eq!(json["event"], "context-changed");
+    assert_eq!(json["what"], "ground");
+    assert!(json.get("p").is_none());
 }

@@ -1,6 +1,7 @@
 //! Observer and detection filter: of the rover's model, or of a model of channels.
 
 use vigil_blocks::SensorFrame;
+use vigil_robot::channel_model::context_change::ChangeWatch;
 use vigil_robot::learned::monitor::DetectionOutput;
 use vigil_robot::learned::{FrameOutcome, Healthy, Monitor, NoiseScales, Observation, Observer};
 use vigil_robot::{channel_model, declared};
@@ -154,6 +155,14 @@ impl DetectionFilter {
             Self::Faults { monitor, .. } => monitor.report(),
             Self::Declared { monitor, .. } => monitor.report(),
             Self::Channels { monitor, .. } => monitor.report(),
+        }
+    }
+
+    /// Changes that are no fault, which a model of channels tells.
+    pub fn changes(&self) -> Option<&ChangeWatch> {
+        match self {
+            Self::Channels { monitor, .. } => Some(monitor.changes()),
+            Self::Faults { .. } | Self::Declared { .. } => None,
         }
     }
 

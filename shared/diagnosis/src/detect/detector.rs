@@ -427,6 +427,12 @@ impl Detector {
             (true, false) => Readiness::NotExcited,
         } as u32;
         belief.degenerate_count = report.degenerate_count;
+        let changes = self.filter.changes();
+        if let Some((changes, last)) = changes.and_then(|all| Some((all, all.last()?))) {
+            belief.context_count = changes.count();
+            belief.context = last.context as u32;
+            belief.context_t_capture_ns = last.t_ns;
+        }
     }
 
     /// Nominal or unknown, at these odds; where a pose is tracked, it is the healthy robot's.

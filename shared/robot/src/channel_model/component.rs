@@ -6,6 +6,7 @@ use vigil_blocks::CHANNELS;
 
 use super::{AXES, CHANNELS_MAX, DRIVES_MAX};
 use crate::channel::{Role, channels};
+use crate::context_table::{CONTEXTS_MAX, DeclaredContext};
 use crate::description::{Description, Kinematics};
 use crate::fault_table::{DECLARED_MAX, DeclaredFault, SHOWN_MAX};
 use crate::frame_guard::{BEYOND_LIMITS, CURRENT_MAX_A};
@@ -165,7 +166,51 @@ pub fn unfit(robot: &Description) -> Option<String> {
     }
     let components = components(robot);
     let unfit = |fault: &DeclaredFault| unfit_fault(fault, robot, (&all, &components));
-    robot.fault.iter().find_map(unfit)
+    let refused = robot.fault.iter().find_map(unfit);
+    refused.or_else(|| unfit_contexts(&robot.context, &components, &all))
+}
+
+/// Why declared contexts cannot be watched; none if they can.
+fn unfit_contexts(
+    contexts: &[DeclaredContext],
+    components: &[Component],
+    all: &[Target],
+) -> Option<String> {
+    let found = contexts.len();
+    if found > CONTEXTS_MAX {
+        return Some(format!("{found} contexts: allowed are {CONTEXTS_MAX}"));
+    }
+    let is_node = |name: &String| {
+        let mut nodes = components.iter();
+        nodes.any(|node| node.name == *name || node.group.as_ref() == Some(name))
+    };
+    let unfit = |(i, DeclaredContext { name, shows }): (usize, &DeclaredContext)| {
+        let is_unknown = |shown: &&String| all.iter().all(|target| target.name != **shown);
+        let said = match name {
+            name if !is_word(name) => format!("'{name}' is no name, which has {LETTERS}"),
+            name if RESERVED.contains(&name.as_str()) => {
+                format!("'{name}' is a word of Vigil's own")
+            }
+            name if is_node(name) || contexts[..i].iter().any(|other| other.name == *name) => {
+                "its name is taken".to_owned()
+            }
+            _ => format!(
+                "shows in '{}', which is no channel; there are {}",
+                shows.iter().find(is_unknown)?,
+                names(all)
+            ),
+        };
+        Some(format!("context '{name}': {said}"))
+    };
+    contexts.iter().enumerate().find_map(unfit)
+}
+
+/// What a name has.
+const LETTERS: &str = "letters, digits, _ and -";
+
+fn is_word(word: &str) -> bool {
+    let is_letter = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    !word.is_empty() && word.chars().all(is_letter)
 }
 
 /// Why a declared fault cannot be watched; none if it can.
@@ -175,12 +220,10 @@ fn unfit_fault(
     (all, components): (&[Target], &[Component]),
 ) -> Option<String> {
     let name = &fault.name;
-    let is_letter = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    let is_word = |word: &String| !word.is_empty() && word.chars().all(is_letter);
     let words = std::iter::once(name).chain(&fault.group);
     if let Some(word) = words.clone().find(|word| !is_word(word)) {
         return Some(format!(
-            "fault '{name}': '{word}' is no name, which has letters, digits, _ and -"
+            "fault '{name}': '{word}' is no name, which has {LETTERS}"
         ));
     }
     if let Some(word) = words.clone().find(|word| RESERVED.contains(&word.as_str())) {
@@ -219,11 +262,15 @@ fn unfit_fault(
     }
     let is_unknown = |shown: &&String| all.iter().all(|target| target.name != **shown);
     let unknown = fault.shows.iter().find(is_unknown)?;
-    let known: Vec<&str> = all.iter().map(|target| target.name.as_str()).collect();
     Some(format!(
         "fault '{name}' shows in '{unknown}', which is no channel; there are {}",
-        known.join(", ")
+        names(all)
     ))
+}
+
+fn names(all: &[Target]) -> String {
+    let names: Vec<&str> = all.iter().map(|target| target.name.as_str()).collect();
+    names.join(", ")
 }
 
 /// What turns a part of the command into motion: a wheel's motor, or an axis of the command where

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::component::targets;
+use crate::context_table::DeclaredContext;
 use crate::description::Description;
 use crate::fault_table::DeclaredFault;
 
@@ -21,6 +22,8 @@ pub(super) struct Identity {
     pub warm_up_s: f64,
     /// Declared faults.
     pub faults: Vec<DeclaredFault>,
+    /// Declared contexts.
+    pub contexts: Vec<DeclaredContext>,
 }
 
 impl Identity {
@@ -34,6 +37,7 @@ impl Identity {
             interval_s: robot.interval_s,
             warm_up_s: robot.warm_up_s,
             faults: without_groups(&robot.fault),
+            contexts: robot.context.clone(),
         }
     }
 }
@@ -73,6 +77,13 @@ impl fmt::Display for Identity {
             }
             if let Some(wheel) = &fault.wheel {
                 write!(f, " (turns with {wheel})")?;
+            }
+        }
+        for (i, context) in self.contexts.iter().enumerate() {
+            let before = ["", "; contexts"][usize::from(i == 0)];
+            write!(f, "{before} {}", context.name)?;
+            if !context.shows.is_empty() {
+                write!(f, " (shows in {})", context.shows.join(" "))?;
             }
         }
         Ok(())

@@ -18,6 +18,7 @@
 //! | [`signature`] | what labelled runs showed of a declared fault |
 //! | [`orders`] | what channels show in step with the turns of a wheel |
 //! | [`turning`] | what labelled runs showed of a fault that comes back with them |
+//! | [`context_change`] | changes that are no fault, by labelled runs |
 //! | [`declared_faults`] | the faults that a description declares, weighed |
 //! | [`bank`] | all faults, weighed |
 //! | [`belief`] | what is believed of components |
@@ -40,6 +41,7 @@ pub mod bank;
 pub mod belief;
 pub mod channel;
 pub mod component;
+pub mod context_change;
 pub mod coverage;
 pub mod declared_faults;
 pub mod directions;
@@ -47,6 +49,7 @@ pub mod fault_kind;
 mod identity;
 pub mod law;
 pub mod model;
+mod model_check;
 pub mod monitor;
 pub mod observation;
 pub mod orders;

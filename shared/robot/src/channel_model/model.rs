@@ -2,17 +2,20 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::channel::{Channel, Regressor, Term};
+use super::channel::Channel;
+use super::context_change::ContextChanges;
 use super::coverage::{Combinations, Range, widening};
 use super::fault_kind::FaultKind;
 use super::identity::{Identity, without_groups};
 use super::law::{Direction, Law};
-use super::observation::{DEPTH, History, SMOOTHING_S};
-use super::scatter::{Scatter, ScatterLaw};
+use super::model_check::{check_channel, check_scatter};
+use super::observation::History;
+use super::scatter::Scatter;
 use super::signature::Signatures;
 use super::turning::TurningSignatures;
 use super::{AXES, CHANNELS_MAX, DRIVES_MAX};
 use crate::alarm::AlarmError;
+use crate::context_table::DeclaredContext;
 use crate::description::{Description, INTERVAL_MAX_S, INTERVAL_MIN_S};
 use crate::fault_table::DeclaredFault;
 use crate::learned::channels::Channels;
@@ -26,19 +29,10 @@ pub const VERSION: u32 = 4;
 pub const KIND: &str = "channels";
 /// Prior fault rate at which log-odds are collected and tempered, 1/h.
 pub const FAULT_RATE_1_H: f64 = 1.0;
-/// Largest weight of a term.
-const WEIGHT_MAX: f64 = 1e9;
 /// Time at rest from which on a robot at rest is known, s.
 const REST_MIN_S: f64 = 3.0;
-/// Terms of a channel. Of four axes to the fourth order learning makes 70 products, 32 lagged axes,
-/// 32 smoothed ones and 8 senses. Smaller refuses such a model; larger only lets a file cost more
-/// time.
-const TERMS_MAX: usize = 160;
-/// Largest order of a polynomial.
-const ORDER_MAX: u32 = 4;
 // `Model::check` names these in its messages as numbers.
 const _: () = assert!(AXES == 4 && CHANNELS_MAX == 28 && DRIVES_MAX == 8);
-const _: () = assert!(TERMS_MAX == 160 && DEPTH == 9 && ORDER_MAX == 4);
 
 /// Faults whose log-odds behave alike without a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -173,6 +167,12 @@ pub struct Model {
     /// How they came back in them with the turns of a wheel.
     #[serde(default, skip_serializing_if = "TurningSignatures::is_empty")]
     pub turning: TurningSignatures,
+    /// Changes that are no fault, which the robot declares.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub declared_context: Vec<DeclaredContext>,
+    /// How they showed in labelled runs.
+    #[serde(default, skip_serializing_if = "ContextChanges::is_empty")]
+    pub contexts: ContextChanges,
     /// Tails of the classes of faults.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tail: Vec<Tail>,
@@ -229,6 +229,7 @@ impl Model {
             interval_s: self.interval_s,
             warm_up_s: self.warm_up_s,
             faults: without_groups(&self.declared),
+            contexts: self.declared_context.clone(),
         };
         let of_robot = Identity::of_robot(robot);
         if of_model == of_robot {
@@ -366,10 +367,13 @@ impl ModelFile for Model {
                            amplitudes up to 1e6, squares of 0 to 1e18";
             return refuse("turning", found, allowed);
         }
-        let names = self.signatures.fault.iter().map(|one| one.fault.as_str());
-        self.check_names("signatures", names.collect())?;
-        let names = self.turning.fault.iter().map(|one| one.fault.as_str());
-        self.check_names("turning", names.collect())?;
+        if !self.contexts.fits(count) {
+            let found = format!("{} changes", self.contexts.change.len());
+            let allowed = "at most 4 changes of 4 ages, each with at most 4 directions: a weight \
+                           up to 1e6 for each channel, ratios of 1 to 1e9, thresholds of 0 to 1e9";
+            return refuse("contexts", found, allowed);
+        }
+        self.check_names()?;
         self.tail.iter().try_for_each(check_tail)?;
         self.calibration.iter().try_for_each(check_calibration)
     }
@@ -380,77 +384,35 @@ fn is_zero(value: &f64) -> bool {
 }
 
 impl Model {
-    /// Checks that each of these names is one declared fault's.
-    fn check_names(&self, key: &str, names: Vec<&str>) -> Result<(), ModelError> {
-        let is_wrong = |&i: &usize| {
-            let declared = self.declared.iter().any(|fault| fault.name == names[i]);
-            !declared || names[..i].contains(&names[i])
-        };
-        match (0..names.len()).find(is_wrong) {
-            None => Ok(()),
-            Some(i) => {
-                let key = format!("{key}.fault.{i}.fault");
-                refuse(key, names[i], "each declared fault once")
-            }
-        }
+    /// Checks that what was learned is of declared faults and contexts, each once.
+    fn check_names(&self) -> Result<(), ModelError> {
+        let faults: Vec<&str> = self.declared.iter().map(|one| one.name.as_str()).collect();
+        let contexts = self.declared_context.iter();
+        let contexts: Vec<&str> = contexts.map(|one| one.name.as_str()).collect();
+        let names = self.signatures.fault.iter().map(|one| one.fault.as_str());
+        check_declared("signatures.fault", "fault", names.collect(), &faults)?;
+        let names = self.turning.fault.iter().map(|one| one.fault.as_str());
+        check_declared("turning.fault", "fault", names.collect(), &faults)?;
+        let names = self.contexts.change.iter().map(|one| one.context.as_str());
+        check_declared("contexts.change", "context", names.collect(), &contexts)
     }
 }
 
-/// Checks the numbers of a channel; `axes`: how many there are.
-fn check_channel(key: &str, channel: &Channel, axes: usize) -> Result<(), ModelError> {
-    let (terms, weights) = (channel.terms.len(), channel.weights.len());
-    if terms != weights || terms > TERMS_MAX {
-        let found = format!("{terms} terms and {weights} weights");
-        return refuse(key, found, "as many weights as terms, at most 160");
-    }
-    for (i, term) in channel.terms.iter().enumerate() {
-        check_term(&format!("{key}.terms.{i}"), term, axes)?;
-    }
-    let is_large = |weight: &&f64| weight.is_nan() || weight.abs() > WEIGHT_MAX;
-    if let Some(weight) = channel.weights.iter().find(is_large) {
-        return refuse(format!("{key}.weights"), weight, "numbers up to 1e9");
-    }
-    if !channel.variance[0].is_normal() {
-        let found = channel.variance[0];
-        return refuse(format!("{key}.variance"), found, "above 0 at first");
-    }
-    let variance = channel.variance.iter().map(|value| ("variance", value));
-    let others = [
-        ("usual", &channel.usual),
-        ("held_out_ratio", &channel.held_out_ratio),
-        ("silence_s", &channel.silence_s),
-    ];
-    let context = channel.context_sd.iter().map(|value| ("context_sd", value));
-    for (name, value) in variance.chain(others).chain(context) {
-        if !(value.is_finite() && *value >= 0.0) {
-            return refuse(format!("{key}.{name}"), value, "a finite number from 0");
+/// Checks that each of these names of tables `key` is a declared one; `of`: what they name.
+fn check_declared(
+    key: &str,
+    of: &str,
+    names: Vec<&str>,
+    declared: &[&str],
+) -> Result<(), ModelError> {
+    let is_wrong = |&i: &usize| !declared.contains(&names[i]) || names[..i].contains(&names[i]);
+    match (0..names.len()).find(is_wrong) {
+        None => Ok(()),
+        Some(i) => {
+            let allowed = format!("each declared {of} once");
+            refuse(format!("{key}.{i}.{of}"), names[i], &allowed)
         }
     }
-    Ok(())
-}
-
-/// Checks the law of the roughness.
-fn check_scatter(scatter: &Scatter, channels: usize) -> Result<(), ModelError> {
-    let rows = scatter.covariance.iter().all(|row| row.len() == channels);
-    let sizes = scatter.mean.len() == channels && scatter.covariance.len() == channels && rows;
-    let mut values = scatter
-        .mean
-        .iter()
-        .chain(scatter.covariance.iter().flatten());
-    let bounded = values.all(|value| value.abs() <= 1e6);
-    let n = scatter.covariance.len();
-    let of = &scatter.covariance;
-    let sound = |i: usize| of[i][i] >= 1e-6 && (0..i).all(|j| (of[i][j] - of[j][i]).abs() < 1e-9);
-    let places: Vec<usize> = (0..n).collect();
-    if sizes && bounded && (0..n).all(sound) && ScatterLaw::new(scatter, &places).is_some() {
-        return Ok(());
-    }
-    let found = format!("{} means", scatter.mean.len());
-    refuse(
-        "scatter",
-        found,
-        "a mean for each channel and a covariance, all up to 1e6, each variance from 1e-6",
-    )
 }
 
 /// Checks the numbers of a tail.
@@ -459,37 +421,4 @@ fn check_tail(tail: &Tail) -> Result<(), ModelError> {
     check_range(&key("level_log_odds"), tail.level_log_odds, -1e4, 1e4)?;
     check_range(&key("interval_h"), tail.interval_h, 1e-9, 1e9)?;
     check_range(&key("slope"), tail.slope, 1e-3, 10.0)
-}
-
-/// Checks that a term points at what exists.
-fn check_term(key: &str, term: &Term, axes: usize) -> Result<(), ModelError> {
-    if term.lag >= DEPTH {
-        return refuse(format!("{key}.lag"), term.lag, "0 to 8");
-    }
-    let is_axis = matches!(term.of, Regressor::Lagged | Regressor::Smoothed);
-    if term.of == Regressor::Smoothed && term.lag >= SMOOTHING_S.len() {
-        return refuse(
-            format!("{key}.lag"),
-            term.lag,
-            "the place of a time constant, 0 or 1",
-        );
-    }
-    if is_axis && term.index >= axes {
-        let key = format!("{key}.index");
-        return refuse(key, term.index, "the index of an axis, from 0");
-    }
-    if term.index >= DRIVES_MAX {
-        return refuse(
-            format!("{key}.index"),
-            term.index,
-            "the index of a drive, 0 to 7",
-        );
-    }
-    let beyond = term.powers.iter().skip(axes).any(|&power| power > 0);
-    let order: u32 = term.powers.iter().map(|&power| u32::from(power)).sum();
-    if beyond || order > ORDER_MAX {
-        let (key, found) = (format!("{key}.powers"), format!("{:?}", term.powers));
-        return refuse(key, found, "powers of the axes, their sum at most 4");
-    }
-    Ok(())
 }

@@ -15,6 +15,7 @@ use super::bank::{Bank, ChannelPlace, DrivePlace, IMPOSSIBLE, KINDS_MAX, Laws, W
 use super::belief::{ComponentBelief, NO_BELIEF, PairBelief};
 use super::channel::{Channel, Scales, commands, lags};
 use super::component::{Places, Quantity, Target, components, drives, targets};
+use super::context_change::ChangeWatch;
 use super::coverage::{Combinations, Range, widening};
 use super::declared_faults::{DeclaredFaults, Taught};
 use super::directions::{covariances, directions};
@@ -113,6 +114,7 @@ pub struct Monitor {
     classes: [f64; Class::ALL.len()],
     beliefs: [ComponentBelief; COMPONENTS_MAX],
     pair: Option<PairBelief>,
+    changes: ChangeWatch,
     report: DetectionOutput,
 }
 
@@ -151,6 +153,7 @@ impl Monitor {
             signatures: &model.signatures,
             turning: &model.turning,
         });
+        let changes = ChangeWatch::new(robot, taught.map(|_| &model.contexts));
         let declared = DeclaredFaults::new(robot, &targets, &laws.mean, taught);
         let watched = watched(at, &sensed, &declared);
         let tail = |class: Class| model.tail(channels, class).cloned();
@@ -171,6 +174,7 @@ impl Monitor {
             classes: [IMPOSSIBLE; Class::ALL.len()],
             beliefs: [NO_BELIEF; COMPONENTS_MAX],
             pair: None,
+            changes,
             report: DetectionOutput {
                 log_odds: IMPOSSIBLE,
                 channels: [IMPOSSIBLE; SLOTS],
@@ -186,6 +190,7 @@ impl Monitor {
     /// Forgets everything.
     pub fn reset(&mut self) {
         self.bank.reset();
+        self.changes.clear();
         self.run_s = 0.0;
         self.sum_up();
         self.report.evidence = 0.0;
@@ -215,6 +220,12 @@ impl Monitor {
         self.pair
     }
 
+    /// Changes that are no fault.
+    #[must_use]
+    pub const fn changes(&self) -> &ChangeWatch {
+        &self.changes
+    }
+
     /// Log-odds of each class of faults at [`FAULT_RATE_1_H`], not tempered.
     #[must_use]
     pub const fn classes(&self) -> [f64; Class::ALL.len()] {
@@ -242,6 +253,9 @@ impl Monitor {
         self.bank
             .window_mut()
             .push(history, &commands(history), (widening, self.suspects));
+        if now.moving {
+            self.changes.take(self.bank.window(), now.t_ns, now.dt_s);
+        }
         let places = &self.places;
         let measured = |channel: usize| now.values[places[channel]].is_some();
         // After a break what was said before stands until there is something new to say.

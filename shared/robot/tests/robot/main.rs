@@ -4,6 +4,7 @@
 
 mod channel_model;
 mod condition;
+mod contexts;
 mod declared_faults;
 mod encoder_noise;
 mod frame_guard;

@@ -16,6 +16,7 @@ use vigil_robot::channel_model::tree::tree;
 use vigil_terminal::CommandError;
 use vigil_terminal::output::Progress;
 
+use super::labelled_runs::as_scored;
 use super::learn_task::{Task, learn};
 
 /// What stays the same over the groups.
@@ -124,7 +125,7 @@ impl CrossValidation<'_> {
                 stages.verdict(frame)
             });
             Some(Case {
-                label: label(&run)?.clone(),
+                label: as_scored(label(&run)?, task.robot),
                 verdicts: verdicts.collect(),
             })
         };

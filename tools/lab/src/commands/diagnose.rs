@@ -3,8 +3,10 @@
 use std::fs::File;
 use std::path::PathBuf;
 
+use vigil_blocks::DetectionBelief;
 use vigil_evaluation::scoring::Verdict;
 use vigil_learning::plausibility;
+use vigil_robot::Description;
 
 use super::offline::{FilterArgs, OfflineModels};
 use vigil_terminal::output::Progress;
@@ -21,7 +23,7 @@ pub struct Args {
 }
 
 /// Header of the verdicts.
-const COLUMNS: [&str; 15] = [
+const COLUMNS: [&str; 16] = [
     "run",
     "t",
     "p_fault",
@@ -37,6 +39,7 @@ const COLUMNS: [&str; 15] = [
     "action",
     "size",
     "size_kind",
+    "context",
 ];
 
 /// Writes the verdicts.
@@ -60,9 +63,11 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     for (done, run) in runs.iter().enumerate() {
         progress.show(done);
         let mut stages = initial.begin()?;
+        let mut told = ToldCount::default();
         for frame in &run.frames {
             stages.take(frame);
-            let row = row(run.id, &stages.verdict(frame));
+            let context = told.take(stages.detection(), robot);
+            let row = row(run.id, &stages.verdict(frame), context);
             written = written.and_then(|()| writer.write_record(row));
         }
     }
@@ -72,7 +77,23 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     Ok(Outcome::Done)
 }
 
-fn row(run: u32, verdict: &Verdict) -> [String; 15] {
+/// Changes that are no fault, told so far.
+#[derive(Debug, Default)]
+struct ToldCount {
+    count: u32,
+}
+
+impl ToldCount {
+    /// Name of a change that is told now; empty without one.
+    fn take(&mut self, belief: &DetectionBelief, robot: &Description) -> String {
+        let before = std::mem::replace(&mut self.count, belief.context_count);
+        let context = robot.context.get(belief.context as usize);
+        let context = context.filter(|_| before != self.count);
+        context.map_or_else(String::new, |context| context.name.clone())
+    }
+}
+
+fn row(run: u32, verdict: &Verdict, context: String) -> [String; 16] {
     let (p, size) = (|value: f64| format!("{value:.6}"), verdict.size);
     [
         run.to_string(),
@@ -90,5 +111,6 @@ fn row(run: u32, verdict: &Verdict) -> [String; 15] {
         verdict.action.clone(),
         size.kind.unit().map_or_else(String::new, |_| p(size.value)),
         size.kind.word().to_owned(),
+        context,
     ]
 }

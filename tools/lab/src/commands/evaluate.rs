@@ -17,6 +17,7 @@ use vigil_recording::labels::{self, Label};
 use vigil_robot::RobotModel;
 
 use super::files::{check_place, write_whole};
+use super::labelled_runs::as_scored;
 use super::offline::{FilterArgs, OfflineModels};
 use document::{Document, filters_text};
 use passes::{Passes, SensorSetResult};
@@ -100,7 +101,8 @@ impl Args {
     /// The runs to score, and their labels.
     fn cases(&self, prepared: &OfflineModels) -> Result<Vec<(Run, Label)>, CommandError> {
         let labels = labels::read(&self.runs, &prepared.robot).map_err(CommandError::usage)?;
-        let labels = labels.into_iter().map(|label| (label.run, label));
+        let scored = |label: Label| (label.run, as_scored(&label, &prepared.robot));
+        let labels = labels.into_iter().map(scored);
         let mut labels: BTreeMap<u32, Label> = labels.collect();
         let wanted = self.part(&prepared.model, &prepared.runs)?;
         let with_label = wanted.into_iter().map(|run| match labels.remove(&run.id) {

@@ -11,7 +11,7 @@ use vigil_robot::Description;
 use vigil_robot::channel_model::Model;
 use vigil_terminal::CommandError;
 
-use super::labelled_runs::{healthy_part, labelled_runs};
+use super::labelled_runs::{Labelled, healthy_part, labelled_runs};
 
 /// Runs from which some are left out; below, blocks of them are.
 const RUNS_TO_SPLIT: usize = 6;
@@ -78,14 +78,15 @@ pub(super) fn learn(
     held_out: &[u32],
     isolability_at_h: Option<f64>,
 ) -> Result<(Model, Report), CommandError> {
-    let faulty = match task.labels {
+    let found = match task.labels {
         Some(labels) => labelled_runs(task.runs, labels, task.robot)?,
-        None => Vec::new(),
+        None => Labelled::default(),
     };
-    let healthy = task.runs.iter().map(|run| healthy_part(run, &faulty));
+    let Labelled { faults, changes } = found;
+    let healthy = task.runs.iter().map(|run| healthy_part(run, &faults));
     let healthy: Vec<Run> = healthy.filter(|run| !run.frames.is_empty()).collect();
     let is_learned = |label: &LabelledRun<'_>| !held_out.contains(&label.run.id);
-    let labelled: Vec<LabelledRun<'_>> = faulty.into_iter().filter(is_learned).collect();
+    let labelled: Vec<LabelledRun<'_>> = faults.into_iter().filter(is_learned).collect();
     let groups = task.labels.unwrap_or_default().iter();
     let groups: Vec<(u32, String)> = groups
         .map(|label| (label.run, label.group.clone()))
@@ -93,6 +94,7 @@ pub(super) fn learn(
     let log = Log {
         healthy: &healthy,
         labelled: &labelled,
+        changes: &changes,
         groups: &groups,
         held_out,
         until_s: task.until_s,

@@ -3,6 +3,7 @@
 #![cfg(test)]
 
 mod channels;
+mod contexts;
 mod declared_faults;
 mod import;
 mod init;

@@ -197,7 +197,7 @@ fn verdicts_are_causal() {
         let whole = diagnose("whole.csv", &|run, _| ids.contains(&run));
         assert_eq!(whole.lines().count(), 1 + 3 * 300);
         let header = "run,t,p_fault,alarm,mode,p_mode,p_unknown,fault_set,p_left_stuck,\
-                      p_right_stuck,reported,reason,action,size,size_kind";
+                      p_right_stuck,reported,reason,action,size,size_kind,context";
         assert_eq!(whole.lines().next(), Some(header));
         assert!(whole.contains(",1,RM_STUCK,"), "something is diagnosed");
         // Runs, seconds, and frames of each run until then.

@@ -6,6 +6,7 @@
 //! the deviations.
 
 mod calibrate;
+mod contexts;
 mod coverage;
 mod excitation;
 mod isolability;
@@ -24,6 +25,7 @@ mod view;
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_robot::channel_model::channel::lags;
+use vigil_robot::channel_model::context_change::ContextChanges;
 use vigil_robot::channel_model::model::{KIND, VERSION};
 use vigil_robot::channel_model::scatter::Scatter;
 use vigil_robot::channel_model::signature::Signatures;
@@ -35,6 +37,7 @@ use vigil_robot::learned::model::Provenance;
 
 use crate::data_hash::data_hash;
 use crate::plausibility::{self, RunCheck, RunDoubt};
+pub use contexts::{ContextFit, LabelledChange, TOLD_S};
 pub use isolability::Isolability;
 pub use labelled::{FaultFit, LabelledRun};
 use record::{FOLDS, Record};
@@ -129,6 +132,8 @@ pub struct Log<'a> {
     pub healthy: &'a [Run],
     /// Runs of declared faults.
     pub labelled: &'a [LabelledRun<'a>],
+    /// Changes of declared contexts in healthy runs.
+    pub changes: &'a [LabelledChange<'a>],
     /// Names of groups by the ids of runs: those of one group are never judged by each other. A run
     /// without one is a group of its own.
     pub groups: &'a [(u32, String)],
@@ -148,6 +153,7 @@ impl<'a> Log<'a> {
         Self {
             healthy: runs,
             labelled: &[],
+            changes: &[],
             groups: &[],
             held_out: &[],
             until_s: f64::INFINITY,
@@ -202,6 +208,16 @@ pub fn learn(log: &Log<'_>, robot: &Description) -> Result<(Model, Report), LogE
         }
     }
     joint::fit(&mut model, &mut models, &records, &scales);
+    let changes = contexts::Runs {
+        ids: learned.iter().map(|run| run.id).collect(),
+        groups: learned
+            .iter()
+            .map(|run| record::group(run, log.groups))
+            .collect(),
+        labelled: log.changes,
+    };
+    let parts = (models.as_slice(), records.as_slice());
+    report.contexts = contexts::fit(&mut model, parts, &changes, (robot, &scales));
     report.faults = fit_declared((&mut model, &mut models), &records, log, (robot, &scales));
     calibrate::fit(&mut model, &mut models, &records, robot);
     calibrate::tell(&mut report.bounds, &model);
@@ -261,7 +277,9 @@ fn provenance(log: &Log<'_>, learned: &[&Run], left_out: &[&Run]) -> Provenance 
         let LabelledRun { run, onset_s, .. } = label;
         format!("{} {} {onset_s}", run.id, label.fault)
     });
-    let labels: Vec<String> = labels.collect();
+    let changes = log.changes.iter();
+    let changes = changes.map(|one| format!("{} {} {}", one.run, one.context, one.onset_s));
+    let labels: Vec<String> = labels.chain(changes).collect();
     let runs = log.labelled.iter().map(|label| label.run);
     let runs: Vec<&Run> = learned.iter().copied().chain(runs).collect();
     Provenance {
@@ -299,6 +317,8 @@ fn blank(
         declared: robot.fault.clone(),
         signatures: Signatures::default(),
         turning: TurningSignatures::default(),
+        declared_context: robot.context.clone(),
+        contexts: ContextChanges::default(),
         tail: Vec::new(),
         calibration: Vec::new(),
     }

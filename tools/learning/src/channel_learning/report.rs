@@ -6,6 +6,7 @@ use serde::Serialize;
 use vigil_robot::channel_model::{Channel, Model, Term};
 
 use super::LONG_ENOUGH_S;
+use super::contexts::ContextFit;
 use super::isolability::Isolability;
 use super::labelled::FaultFit;
 use super::terms::word;
@@ -43,6 +44,9 @@ pub struct Report {
     pub channels: Vec<ChannelFit>,
     /// What labelled runs show of each declared fault.
     pub faults: Vec<FaultFit>,
+    /// What labelled runs show of each declared context.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub contexts: Vec<ContextFit>,
     /// What the user must know.
     pub warnings: Vec<String>,
     /// Numbers of the model that stand on a bound set by hand.
@@ -89,6 +93,7 @@ impl Report {
             exposure_s: model.exposure_s,
             channels: Vec::new(),
             faults: Vec::new(),
+            contexts: Vec::new(),
             warnings,
             bounds: Bounds::default(),
             isolability: None,
@@ -180,11 +185,14 @@ impl fmt::Display for Report {
                 channel.held_out_ratio
             )?;
         }
-        if !self.faults.is_empty() {
+        if !(self.faults.is_empty() && self.contexts.is_empty()) {
             writeln!(f)?;
         }
         for fault in &self.faults {
             writeln!(f, "{fault}")?;
+        }
+        for context in &self.contexts {
+            writeln!(f, "{context}")?;
         }
         let lines = self.bounds.lines();
         if !lines.is_empty() {

@@ -5,6 +5,7 @@
 mod channel_learning;
 mod channel_sensing;
 mod commanded_faults;
+mod contexts;
 mod declared_faults;
 mod isolability;
 mod learning;

@@ -22,6 +22,7 @@ pub fn rover() -> Description {
         command: Vec::new(),
         channel: Vec::new(),
         fault: Vec::new(),
+        context: Vec::new(),
         warm_up_s: 0.0,
         measured: vigil_robot::description::MeasuredChannels::default(),
         polynomial_order: 4,
