@@ -48,9 +48,8 @@ pub fn log(archive: &str, log: &str) -> Result<Log, Box<dyn Error>> {
 /// # Errors
 /// What is missing or malformed.
 pub fn unpacked(archive: &str) -> Result<PathBuf, Box<dyn Error>> {
-    let data = std::env::var("VIGIL_DATA").map_err(
-        |_| "VIGIL_DATA is not set: the folder that holds real/kobuki_wheel_fault.tar.xz",
-    )?;
+    let data = std::env::var("VIGIL_DATA");
+    let data = data.map_err(|_| "VIGIL_DATA is not set: the folder that holds real/")?;
     let into = root().join("target/real");
     let folder = into.join(archive);
     if !folder.is_dir() {

@@ -396,7 +396,7 @@ pub fn components(robot: &Description) -> Vec<Component> {
     };
     let group_of = |declared: &DeclaredFault| {
         let name = declared.wheel.as_ref()?;
-        group(robot.wheels.iter().position(|wheel| wheel.name == *name))
+        group(robot.wheel_index(name))
     };
     let mut out: Vec<Component> = Vec::new();
     for target in targets(robot) {

@@ -40,7 +40,7 @@ impl Turning {
         let name = fault.wheel.as_ref()?;
         let mut signatures = learned.fault.iter();
         Some(Self {
-            wheel: robot.wheels.iter().position(|wheel| wheel.name == *name)?,
+            wheel: robot.wheel_index(name)?,
             noise: learned.noise(name)?.clone(),
             signature: signatures.find(|one| one.fault == fault.name)?.clone(),
         })

@@ -362,13 +362,13 @@ impl Monitor {
         let total = log_sum_exp(&odds[first..n]);
         let mut shares = [IMPOSSIBLE; DECLARED_MAX + 1];
         let declared = self.bank.declared();
+        let pair = declared.pair().map_or(0.0, |(both, _)| {
+            both.map(|one| declared.beyond_bound(one)).iter().sum()
+        });
         for (i, (share, raw)) in shares.iter_mut().zip(&raw[first..n]).enumerate() {
-            let beyond = match declared.pair() {
-                Some((both, _)) if i == declared.len() => {
-                    both.map(|one| declared.beyond_bound(one)).iter().sum()
-                }
-                _ if i < declared.len() => declared.beyond_bound(i),
-                _ => 0.0,
+            let beyond = match i < declared.len() {
+                true => declared.beyond_bound(i),
+                false => pair,
             };
             *share = slope * (log_sum_exp(&classes.map(|class| raw[class])) + beyond);
         }

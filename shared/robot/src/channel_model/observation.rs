@@ -149,15 +149,12 @@ fn within(value: f64, period: Option<f64>) -> f64 {
 
 /// The wheels with whose turns a declared fault comes back: place of the rate, and wheel.
 fn turning(robot: &Description, targets: &[Target]) -> Vec<(usize, usize)> {
-    let is_named = |wheel: usize| {
-        let name = robot.wheels.get(wheel).map(|wheel| &wheel.name);
-        let mut named = robot.fault.iter().filter_map(|fault| fault.wheel.as_ref());
-        named.any(|named| Some(named) == name)
-    };
+    let named = robot.fault.iter().filter_map(|fault| fault.wheel.as_ref());
+    let named: Vec<usize> = named.filter_map(|name| robot.wheel_index(name)).collect();
     let rates = targets.iter().enumerate();
     let rates = rates.filter(|(_, target)| target.quantity == Quantity::WheelRate);
     let wheels = rates.filter_map(|(place, target)| Some((place, target.wheel?)));
-    wheels.filter(|&(_, wheel)| is_named(wheel)).collect()
+    wheels.filter(|(_, wheel)| named.contains(wheel)).collect()
 }
 
 /// Builds observations from frames.
@@ -307,10 +304,10 @@ impl Observer {
     /// Adds a frame's readings; true if one was refused.
     fn collect(&mut self, frame: &SensorFrame) -> bool {
         let mut invalid = false;
-        let mut push = |mean: &mut Mean, value: Option<f64>, (largest, period)| match value {
-            Some(value) if value.abs() <= largest => mean.push(value, period),
-            Some(_) => invalid = true,
-            None => {}
+        let mut push = |mean: &mut Mean, value: Option<f64>, (largest, period)| {
+            let sane = value.filter(|value| value.abs() <= largest);
+            invalid |= value.is_some() && sane.is_none();
+            sane.inspect(|&value| mean.push(value, period))
         };
         for (i, axis) in self.robot.command.iter().enumerate().take(AXES) {
             let largest = BEYOND_LIMITS * axis.limit;
@@ -321,8 +318,7 @@ impl Observer {
         for (target, (mean, reading)) in self.targets.iter().zip(slots) {
             if target.place < CHANNELS {
                 let value = frame.measured(target.place);
-                push(mean, value, (target.largest, target.period));
-                let sane = value.filter(|value| value.abs() <= target.largest);
+                let sane = push(mean, value, (target.largest, target.period));
                 *reading = sane.filter(|_| target.period.is_none());
             }
         }

@@ -5,7 +5,7 @@
 //! ratio is kept where it exceeds what so few runs show by chance. A change is used if at least
 //! half of its runs are told without their group having been seen.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fmt;
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -18,7 +18,7 @@ use vigil_robot::channel_model::context_change::{
 use vigil_robot::channel_model::law::BLOCK_S;
 use vigil_robot::channel_model::{Model, Scales};
 
-use super::labelled::{FOUND, FOUND_RATIO};
+use super::recognition::{FOUND, FOUND_RATIO, found_unseen};
 use super::record::Record;
 use super::unseen;
 
@@ -380,23 +380,9 @@ impl<'a> Health<'a> {
 
     /// How many of these are told by what the other groups show, and when they came.
     fn told(&self, runs: &[&Labelled<'_>]) -> usize {
-        let mut by_group: BTreeMap<&str, Vec<&Labelled<'_>>> = BTreeMap::new();
-        for run in runs {
-            by_group.entry(run.group).or_default().push(run);
-        }
-        let mut told = 0;
-        for (group, left_out) in &by_group {
-            let others = runs.iter().copied().filter(|run| run.group != *group);
-            let others: Vec<&Labelled<'_>> = others.collect();
-            let Some(change) = self.change("", &others) else {
-                continue;
-            };
-            told += left_out
-                .iter()
-                .filter(|run| self.is_told(&change, run))
-                .count();
-        }
-        told
+        let learn = |others: &[&Labelled<'_>]| self.change("", others);
+        let is_told = |change: &ContextChange, run: &Labelled<'_>| self.is_told(change, run);
+        found_unseen(runs, |run| run.group, learn, is_told)
     }
 
     /// True if the first change that is told of a run is the labelled one.

@@ -6,7 +6,7 @@
 //! them apart. A signature is kept if it finds at least half of the fault's
 //! runs without having seen the group that they are of, so one of a single group never is.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
@@ -16,11 +16,12 @@ use vigil_robot::Description;
 use vigil_robot::channel_model::channel::commands;
 use vigil_robot::channel_model::law::BLOCKS;
 use vigil_robot::channel_model::signature::{
-    Evidence, Features, Means, Phase, SD_MIN, Signature, Signatures, means, means_count, terms,
+    Features, Means, Phase, SD_MIN, Signature, Signatures, means, means_count, terms,
 };
 use vigil_robot::channel_model::window::Window;
 use vigil_robot::channel_model::{AXES, Model, Scales};
 
+use super::recognition::{found_unseen, highest, threshold};
 use super::record::{self, Record};
 use super::unseen;
 
@@ -35,10 +36,7 @@ const OWN_RUNS: f64 = 3.0;
 const STEADY_RUNS: f64 = 1.0;
 /// Part of a covariance that is taken for independent.
 const INDEPENDENT: f64 = 0.1;
-/// A run is found if its evidence exceeds this, nats, and the highest in health by a factor, within
-/// a time after the onset.
-pub(super) const FOUND: f64 = 5.0;
-pub(super) const FOUND_RATIO: f64 = 1.2;
+/// Time after the onset within which a run is to be found, s.
 const FOUND_S: f64 = 10.0;
 
 /// A run with a declared fault.
@@ -424,45 +422,27 @@ impl Health {
     fn highest(&self, signature: &Signature) -> f64 {
         let of_run = |run: &HealthyRun| {
             let observations = run.dt_s.iter().zip(&run.seen);
-            highest(signature, observations.map(|(dt_s, m)| (*dt_s, m)))
+            highest(observations.map(|(dt_s, seen)| (signature.log_ratio(seen), *dt_s)))
         };
         self.runs.iter().map(of_run).fold(0.0, f64::max)
     }
 }
 
-/// The highest evidence over successive means, each of an observation of so many seconds.
-fn highest<'a>(signature: &Signature, all: impl Iterator<Item = (f64, &'a Features)>) -> f64 {
-    let mut evidence = Evidence::default();
-    let step = |(dt_s, seen): (f64, &Features)| {
-        evidence.take(signature.log_ratio(seen), dt_s);
-        evidence.log_ratio()
-    };
-    all.map(step).fold(0.0, f64::max)
-}
-
 /// How many of a fault's runs are found by the signature that the other groups show.
 fn found(health: &Health, fault: &str, runs: &[&Sample<'_>]) -> usize {
-    let mut by_group: BTreeMap<&str, Vec<&Sample<'_>>> = BTreeMap::new();
-    for run in runs {
-        by_group.entry(&run.group).or_default().push(run);
-    }
-    let mut found = 0;
-    for (group, left_out) in &by_group {
-        let others: Vec<&Sample<'_>> = runs
-            .iter()
-            .filter(|run| run.group != *group)
-            .copied()
-            .collect();
-        let signature = health.signature(fault, &others);
-        let Some(signature) = signature.filter(|_| !others.is_empty()) else {
-            continue;
-        };
-        let threshold = FOUND.max(FOUND_RATIO * health.highest(&signature));
-        let is_found = |run: &&&Sample<'_>| {
+    let learn = |others: &[&Sample<'_>]| {
+        let signature = health.signature(fault, others)?;
+        let threshold = threshold(health.highest(&signature));
+        Some((signature, threshold))
+    };
+    found_unseen(
+        runs,
+        |run| &run.group,
+        learn,
+        |(signature, threshold), run| {
             let observations = run.ages.iter().zip(&run.seen);
-            highest(&signature, observations.map(|([_, dt_s], m)| (*dt_s, m))) > threshold
-        };
-        found += left_out.iter().filter(is_found).count();
-    }
-    found
+            let ratios = observations.map(|([_, dt_s], seen)| (signature.log_ratio(seen), *dt_s));
+            highest(ratios) > *threshold
+        },
+    )
 }

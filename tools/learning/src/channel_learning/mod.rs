@@ -13,6 +13,7 @@ mod isolability;
 mod joint;
 mod labelled;
 mod noise;
+mod recognition;
 mod record;
 mod regression;
 mod report;

@@ -12,13 +12,13 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 use vigil_robot::Description;
 use vigil_robot::channel_model::orders::{MEMORIES_TURNS, ORDERS};
-use vigil_robot::channel_model::signature::Evidence;
 use vigil_robot::channel_model::turning::{
     TurningSignature, TurningSignatures, WheelNoise, turned,
 };
 use vigil_robot::channel_model::{Model, WheelOrders};
 
-use super::labelled::{FOUND, FOUND_RATIO, FaultFit, LabelledRun};
+use super::labelled::{FaultFit, LabelledRun};
+use super::recognition::{found_unseen, highest, threshold};
 use super::record::{self, Record};
 
 /// The memory that is learned from.
@@ -78,7 +78,7 @@ pub(super) fn fit(
         let Some(name) = fault.wheel.as_ref().filter(|_| !labels.is_empty()) else {
             continue;
         };
-        let Some(wheel) = robot.wheels.iter().position(|wheel| wheel.name == *name) else {
+        let Some(wheel) = robot.wheel_index(name) else {
             continue;
         };
         let of_run = |label: &&LabelledRun<'_>| record::all(&[label.run], until_s, robot);
@@ -302,36 +302,27 @@ impl Health<'_> {
 
     /// How many of these runs are found by what the runs of the other groups have in common.
     fn found(&self, runs: &[Sample<'_>]) -> usize {
-        let groups: BTreeSet<&str> = runs.iter().map(|run| run.group.as_str()).collect();
-        let mut found = 0;
-        for group in groups {
-            let (left_out, others): (Vec<_>, Vec<_>) =
-                runs.iter().partition(|run| run.group == group);
-            let Some(template) = self.template(&others) else {
-                continue;
-            };
-            let signature = signature(("", others.len()), &template);
-            let highest = |run: &Sample<'_>| self.highest(&signature, run);
-            let healthy = self.runs.iter().map(highest).fold(0.0, f64::max);
-            let threshold = FOUND.max(FOUND_RATIO * healthy);
-            found += left_out
-                .iter()
-                .filter(|run| highest(run) > threshold)
-                .count();
-        }
-        found
+        let learn = |others: &[&Sample<'_>]| {
+            let signature = signature(("", others.len()), &self.template(others)?);
+            let healthy = self.runs.iter().map(|run| self.highest(&signature, run));
+            let threshold = threshold(healthy.fold(0.0, f64::max));
+            Some((signature, threshold))
+        };
+        let runs: Vec<&Sample<'_>> = runs.iter().collect();
+        found_unseen(
+            &runs,
+            |run| &run.group,
+            learn,
+            |(signature, threshold), run| self.highest(signature, run) > *threshold,
+        )
     }
 
     /// The highest evidence for a signature in a run.
     fn highest(&self, signature: &TurningSignature, run: &Sample<'_>) -> f64 {
-        let mut evidence = Evidence::default();
-        let step = |sight: &Sight<'_>| {
-            if let Some(found) = signature.log_ratio(&self.noise, self.wheel, sight.all) {
-                evidence.take(found, sight.dt_s);
-            }
-            evidence.log_ratio()
-        };
-        run.sights.iter().map(step).fold(0.0, f64::max)
+        highest(run.sights.iter().filter_map(|sight| {
+            let log_ratio = signature.log_ratio(&self.noise, self.wheel, sight.all)?;
+            Some((log_ratio, sight.dt_s))
+        }))
     }
 }
 
