@@ -51,6 +51,8 @@ pub struct Look {
     pub block: usize,
     /// Evidence for each of the two faults, nats.
     pub evidence: [f64; 2],
+    /// Evidence for both, nats: for the likelier one, and for the other beside it.
+    pub evidence_both: f64,
     /// True if the odds of a fault exceed the threshold of the alarm.
     pub alarm: bool,
     /// The most probable faults then.
@@ -185,11 +187,14 @@ fn looks_at(
         }
         next_s += LOOK_EVERY_S;
         let declared = monitor.bank().declared();
+        let evidence = [0, 1].map(|fault| declared.evidence(fault).unwrap_or(0.0));
+        let further = declared.pair().map_or(0.0, |pair| pair.further);
         let verdict = stages.verdict(frame);
         out.push(Look {
             class: block.class,
             block: block.place,
-            evidence: [0, 1].map(|fault| declared.evidence(fault).unwrap_or(0.0)),
+            evidence,
+            evidence_both: evidence[0].max(evidence[1]) + further,
             alarm: verdict.log_odds > threshold,
             named: verdict.fault_set.clone(),
         });
@@ -206,9 +211,7 @@ pub fn figures(looks: &[Look]) -> Vec<(String, Figure)> {
     let scores: [(&str, usize, Score); 3] = [
         ("left from healthy", 1, |look| look.evidence[0]),
         ("right from healthy", 2, |look| look.evidence[1]),
-        ("both from healthy", 3, |look| {
-            look.evidence[0] + look.evidence[1]
-        }),
+        ("both from healthy", 3, |look| look.evidence_both),
     ];
     let mut out = Vec::new();
     for (name, class, score) in scores {
@@ -305,6 +308,7 @@ mod tests {
             class,
             block: 0,
             evidence: [score, 0.0],
+            evidence_both: score,
             alarm: false,
             named: String::new(),
         };

@@ -1,14 +1,17 @@
 //! The faults that a description declares, weighed over the last few seconds.
 
+use vigil_inference::logspace::log_sum_exp;
+
 use super::component::Target;
 use super::law::{BLOCKS, Law};
+use super::model::Class;
 use super::orders::WheelOrders;
 use super::shift::ShiftLaw;
 use super::signature::{Evidence, Features, Signature, Signatures, Terms, means};
-use super::turning::{TurningSignature, TurningSignatures, WheelNoise};
+use super::turning::{TurningFault, TurningSignatures};
 use super::window::Window;
 use crate::description::Description;
-use crate::fault_table::DeclaredFault;
+use crate::fault_table::{DECLARED_MAX, DeclaredFault};
 
 /// One fault at work.
 #[derive(Debug, Clone)]
@@ -19,37 +22,25 @@ struct Declared {
     /// How it showed in labelled runs.
     signature: Option<Signature>,
     /// How it came back in them with the turns of a wheel.
-    turning: Option<Turning>,
+    turning: Option<TurningFault>,
     evidence: Evidence,
+    /// The same by what the likeliest fault of another wheel does not explain.
+    further: Evidence,
 }
 
-/// A fault that comes back with the turns of a wheel.
-#[derive(Debug, Clone)]
-struct Turning {
-    wheel: usize,
-    noise: WheelNoise,
-    signature: TurningSignature,
-}
-
-impl Turning {
-    fn new(
-        robot: &Description,
-        fault: &DeclaredFault,
-        learned: &TurningSignatures,
-    ) -> Option<Self> {
-        let name = fault.wheel.as_ref()?;
-        let mut signatures = learned.fault.iter();
-        Some(Self {
-            wheel: robot.wheel_index(name)?,
-            noise: learned.noise(name)?.clone(),
-            signature: signatures.find(|one| one.fault == fault.name)?.clone(),
-        })
-    }
-
-    /// What the last turns of its wheel say.
-    fn log_ratio(&self, orders: &[WheelOrders]) -> Option<f64> {
-        self.signature.log_ratio(&self.noise, self.wheel, orders)
-    }
+/// How labelled runs taught that a fault comes back with the turns of its wheel.
+fn turning(
+    robot: &Description,
+    fault: &DeclaredFault,
+    learned: &TurningSignatures,
+) -> Option<TurningFault> {
+    let name = fault.wheel.as_ref()?;
+    let mut signatures = learned.fault.iter();
+    Some(TurningFault {
+        wheel: robot.wheel_index(name)?,
+        noise: learned.noise(name)?.clone(),
+        signature: signatures.find(|one| one.fault == fault.name)?.clone(),
+    })
 }
 
 /// What labelled runs taught of all faults.
@@ -66,6 +57,17 @@ impl Declared {
     const fn is_taught(&self) -> bool {
         self.signature.is_some() || self.turning.is_some()
     }
+}
+
+/// Two faults of different wheels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FaultPair {
+    /// The likeliest one, and another.
+    pub faults: [usize; 2],
+    /// What speaks for the other beside the likeliest, nats.
+    pub further: f64,
+    /// What the evidence of both lacks because ratios are bounded, nats.
+    pub beyond_bound: f64,
 }
 
 /// All of a robot's.
@@ -98,8 +100,9 @@ impl DeclaredFaults {
             Declared {
                 shifts: shifts.unwrap_or_default(),
                 signature: learned.find(|one| one.fault == fault.name).cloned(),
-                turning: taught.and_then(|taught| Turning::new(robot, fault, taught.turning)),
+                turning: taught.and_then(|taught| turning(robot, fault, taught.turning)),
                 evidence: Evidence::default(),
+                further: Evidence::default(),
             }
         });
         Self {
@@ -138,7 +141,7 @@ impl DeclaredFaults {
     /// Forgets the run.
     pub fn reset(&mut self) {
         for declared in &mut self.all {
-            declared.evidence = Evidence::default();
+            (declared.evidence, declared.further) = Default::default();
         }
     }
 
@@ -150,6 +153,29 @@ impl DeclaredFaults {
                 declared.evidence.take(log_ratio, dt_s);
             }
         }
+        let Some(first) = self.likeliest() else {
+            return;
+        };
+        for second in 0..self.all.len() {
+            if let Some(log_ratio) = self.log_ratio_beside(first, second, orders) {
+                self.all[second].further.take(log_ratio, dt_s);
+            }
+        }
+    }
+
+    fn log_ratio_beside(&self, first: usize, second: usize, orders: &[WheelOrders]) -> Option<f64> {
+        let [first, second] = [first, second].map(|fault| self.all[fault].turning.as_ref());
+        let (first, second) = (first?, second?);
+        let is_of_another = first.wheel != second.wheel;
+        is_of_another.then(|| second.log_ratio_beside(first, orders))?
+    }
+
+    /// The fault that comes back with the turns of a wheel for which most speaks; none if nothing
+    /// does.
+    fn likeliest(&self) -> Option<usize> {
+        let of = |i: usize| self.all[i].evidence.unbounded();
+        let turning = (0..self.all.len()).filter(|&i| self.is_turning(i) && of(i) > 0.0);
+        turning.max_by(|&a, &b| of(a).total_cmp(&of(b)))
     }
 
     /// Takes the signatures' part of a window, which is `dt_s` newer than the last one, under a
@@ -190,22 +216,43 @@ impl DeclaredFaults {
     }
 
     /// The two faults of different wheels that come back with their turns and for which most
-    /// speaks, and what speaks for the weaker one, nats; none if there is only one.
+    /// speaks; none if there is only one.
     #[must_use]
-    pub fn pair(&self) -> Option<([usize; 2], f64)> {
-        let of = |i: usize| {
-            let wheel = self.all[i].turning.as_ref()?.wheel;
-            let log_ratio = self.all[i].evidence.log_ratio();
-            (log_ratio > 0.0).then_some((i, wheel, log_ratio))
-        };
-        let likeliest = |apart_from: Option<usize>| {
-            let all = (0..self.all.len()).filter_map(of);
-            let others = all.filter(|(_, wheel, _)| Some(*wheel) != apart_from);
-            others.max_by(|a, b| a.2.total_cmp(&b.2))
-        };
-        let (first, wheel, _) = likeliest(None)?;
-        let (second, _, log_ratio) = likeliest(Some(wheel))?;
-        Some(([first, second], log_ratio))
+    pub fn pair(&self) -> Option<FaultPair> {
+        let first = self.likeliest()?;
+        let wheel = |i: usize| self.all[i].turning.as_ref().map(|turning| turning.wheel);
+        let is_other = |&i: &usize| wheel(i).is_some() && wheel(i) != wheel(first);
+        let others = (0..self.all.len()).filter(is_other);
+        let further = |i: usize| self.all[i].further;
+        let unbounded = |i: &usize| further(*i).unbounded();
+        let second = others.max_by(|a, b| unbounded(a).total_cmp(&unbounded(b)))?;
+        let log_ratio = further(second).log_ratio();
+        (log_ratio > 0.0).then(|| FaultPair {
+            faults: [first, second],
+            further: log_ratio,
+            beyond_bound: self.beyond_bound(first) + further(second).beyond_bound(),
+        })
+    }
+
+    /// Divides `odds`, what speaks for each fault and for two at once, by all that is known of
+    /// each: how rarely a class says so much without a fault is no measure of which one it is.
+    /// `raw`: the log-odds of each by class; `slope`: how much a nat of these counts.
+    pub fn divide(&self, slope: f64, raw: &[[f64; Class::ALL.len()]], odds: &mut [f64]) {
+        let total = log_sum_exp(odds);
+        let pair = self.pair().map_or(0.0, |pair| pair.beyond_bound);
+        let mut shares = [f64::NEG_INFINITY; DECLARED_MAX + 1];
+        for (i, (share, raw)) in shares.iter_mut().zip(raw).enumerate() {
+            let beyond = match i < self.len() {
+                true => self.beyond_bound(i),
+                false => pair,
+            };
+            let known = Class::DECLARED.map(|class| raw[class as usize]);
+            *share = slope * (log_sum_exp(&known) + beyond);
+        }
+        let sum = log_sum_exp(&shares[..odds.len()]);
+        for (odds, share) in odds.iter_mut().zip(shares) {
+            *odds = total + share - sum;
+        }
     }
 
     /// The law of a shift of a fault's channels in windows whose whole blocks begin with `begin`;

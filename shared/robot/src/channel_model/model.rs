@@ -24,7 +24,7 @@ use crate::learned::{Calibration, Form};
 use crate::model_file::{self, ModelFile, check_range, refuse};
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 4;
+pub const VERSION: u32 = 5;
 /// The word by which the file is told from a model of the rover's kind.
 pub const KIND: &str = "channels";
 /// Prior fault rate at which log-odds are collected and tempered, 1/h.
@@ -62,6 +62,8 @@ pub enum Class {
 }
 
 impl Class {
+    /// What declared faults show.
+    pub const DECLARED: [Self; 3] = [Self::Shift, Self::Signature, Self::Turning];
     /// Every class.
     pub const ALL: [Self; 10] = [
         Self::Steady,
@@ -364,7 +366,7 @@ impl ModelFile for Model {
         if !self.turning.fits(count) {
             let found = format!("{} faults", self.turning.fault.len());
             let allowed = "at most 8 faults and 8 wheels, each with five numbers for each channel: \
-                           amplitudes up to 1e6, squares of 0 to 1e18";
+                           amplitudes up to 1e6, squares of 0 to 1e18, excesses of 1 to 1e18";
             return refuse("turning", found, allowed);
         }
         if !self.contexts.fits(count) {
@@ -393,6 +395,14 @@ impl Model {
         check_declared("signatures.fault", "fault", names.collect(), &faults)?;
         let names = self.turning.fault.iter().map(|one| one.fault.as_str());
         check_declared("turning.fault", "fault", names.collect(), &faults)?;
+        for (i, one) in self.turning.fault.iter().enumerate() {
+            let mut declared = self.declared.iter().filter(|fault| fault.name == one.fault);
+            let wheel = declared.find_map(|fault| fault.wheel.as_deref());
+            if wheel.and_then(|wheel| self.turning.noise(wheel)).is_none() {
+                let allowed = "a fault that is declared with a wheel, whose noise stands beside it";
+                return refuse(format!("turning.fault.{i}.fault"), &one.fault, allowed);
+            }
+        }
         let names = self.contexts.change.iter().map(|one| one.context.as_str());
         check_declared("contexts.change", "context", names.collect(), &contexts)
     }

@@ -29,7 +29,6 @@ use super::signature::terms;
 use super::window::Window;
 use super::{AXES, CHANNELS_MAX, COMPONENTS_MAX};
 use crate::description::Description;
-use crate::fault_table::DECLARED_MAX;
 use crate::learned::channels::Channels;
 use crate::learned::monitor::DetectionOutput;
 use crate::slot::{SLOTS, Slot};
@@ -330,52 +329,28 @@ impl Monitor {
                 *slot = log_add(*slot, tempered + value - sharpened_total);
             }
         }
-        self.divide_declared(&raw, &mut odds);
+        self.divide_declared(&raw[..n], &mut odds[..n]);
         self.report_odds(&odds, odds_unknown);
     }
 
     /// Components of the two faults for which [`DeclaredFaults::pair`] speaks, and how much.
     fn pair_components(&self) -> Option<([usize; 2], f64)> {
         let first = self.watched.len() - self.bank.declared().len();
-        let (faults, further) = self.bank.declared().pair()?;
-        Some((faults.map(|fault| first + fault), further))
+        let pair = self.bank.declared().pair()?;
+        Some((pair.faults.map(|fault| first + fault), pair.further))
     }
 
-    /// Divides what speaks for the declared faults among them by all that is known of each: how
-    /// rarely a class says so much without a fault is no measure of which one it is.
-    fn divide_declared(&self, raw: &ClassOdds, odds: &mut Odds) {
-        // The last place is that of two of them.
-        let n = self.watched.len() + 1;
-        let first = n - 1 - self.bank.declared().len();
-        let classes = [Class::Shift, Class::Signature, Class::Turning].map(|class| class as usize);
-        let tails = classes
-            .iter()
-            .filter_map(|&class| self.tails[class].as_ref());
-        let slopes = tails.fold((0.0, 0.0), |(sum, count), tail| {
+    /// Divides what speaks for the declared faults among them, with the mean slope of their tails.
+    fn divide_declared(&self, raw: &[[f64; Class::ALL.len()]], odds: &mut [f64]) {
+        let tails = Class::DECLARED.iter();
+        let tails = tails.filter_map(|&class| self.tails[class as usize].as_ref());
+        let (sum, count) = tails.fold((0.0, 0.0), |(sum, count), tail| {
             (sum + tail.slope, count + 1.0)
         });
-        let slope = if slopes.1 > 0.0 {
-            slopes.0 / slopes.1
-        } else {
-            1.0
-        };
-        let total = log_sum_exp(&odds[first..n]);
-        let mut shares = [IMPOSSIBLE; DECLARED_MAX + 1];
+        let slope = if count > 0.0 { sum / count } else { 1.0 };
         let declared = self.bank.declared();
-        let pair = declared.pair().map_or(0.0, |(both, _)| {
-            both.map(|one| declared.beyond_bound(one)).iter().sum()
-        });
-        for (i, (share, raw)) in shares.iter_mut().zip(&raw[first..n]).enumerate() {
-            let beyond = match i < declared.len() {
-                true => declared.beyond_bound(i),
-                false => pair,
-            };
-            *share = slope * (log_sum_exp(&classes.map(|class| raw[class])) + beyond);
-        }
-        let sum = log_sum_exp(&shares[..n - first]);
-        for (odds, share) in odds[first..n].iter_mut().zip(shares) {
-            *odds = total + share - sum;
-        }
+        let first = odds.len() - 1 - declared.len();
+        declared.divide(slope, &raw[first..], &mut odds[first..]);
     }
 
     fn report_odds(&mut self, odds: &Odds, unknown: f64) {

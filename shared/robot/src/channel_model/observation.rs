@@ -4,7 +4,7 @@ use vigil_blocks::{CHANNELS, SensorFrame};
 use vigil_inference::angle::wrap;
 
 use super::component::{Quantity, Target, targets};
-use super::orders::{MEMORIES_TURNS, OrderTracker, WheelOrders};
+use super::orders::{OrderTracker, WheelOrders};
 use super::{AXES, CHANNELS_MAX};
 use crate::channel_map::ChannelMap;
 use crate::description::Description;
@@ -176,8 +176,7 @@ pub struct Observer {
     /// The readings of the last frame.
     readings: [Option<f64>; CHANNELS_MAX],
     /// The wheels with whose turns a declared fault comes back, and what was found of them.
-    trackers: Vec<OrderTracker>,
-    orders: Vec<WheelOrders>,
+    orders: OrderTracker,
     pose: Option<[f64; 3]>,
     pose_before: Option<[f64; 3]>,
     /// Frames in a row that were not newer than the last one taken.
@@ -189,15 +188,9 @@ impl Observer {
     #[must_use]
     pub fn new(robot: &Description) -> Self {
         let targets = targets(robot);
-        let (mut trackers, mut orders) = (Vec::new(), Vec::new());
-        for (place, wheel) in turning(robot, &targets) {
-            for turns in MEMORIES_TURNS {
-                trackers.push(OrderTracker::new(place, turns, targets.len()));
-                orders.push(WheelOrders::new(wheel, turns, targets.len()));
-            }
-        }
         Self {
             map: ChannelMap::new(robot),
+            orders: OrderTracker::new(&turning(robot, &targets), targets.len()),
             targets,
             robot: robot.clone(),
             history: History::default(),
@@ -210,8 +203,6 @@ impl Observer {
             command: [Mean::default(); AXES],
             means: [Mean::default(); CHANNELS_MAX],
             readings: [None; CHANNELS_MAX],
-            trackers,
-            orders,
             pose: None,
             pose_before: None,
             stale: 0,
@@ -225,10 +216,10 @@ impl Observer {
     }
 
     /// What the last turns show of each wheel with which a declared fault comes back, at the end of
-    /// the newest observation: with each of [`MEMORIES_TURNS`].
+    /// the newest observation: with each of [`MEMORIES_TURNS`](super::orders::MEMORIES_TURNS).
     #[must_use]
     pub fn orders(&self) -> &[WheelOrders] {
-        &self.orders
+        self.orders.found()
     }
 
     /// Forgets everything: the next frame begins a new run.
@@ -262,7 +253,7 @@ impl Observer {
         if broken {
             self.history.clear();
             self.clear();
-            self.trackers.iter_mut().for_each(OrderTracker::clear);
+            self.orders.clear();
         }
         if broken || frame.pose_reset_count != self.reset_count {
             (self.pose, self.pose_before) = (None, None);
@@ -281,9 +272,7 @@ impl Observer {
             };
         }
         self.elapsed_s += dt_s;
-        for tracker in &mut self.trackers {
-            tracker.take(dt_s, &self.readings);
-        }
+        self.orders.take(dt_s, &self.readings);
         let complete = self.elapsed_s + NEARLY * dt_s >= self.robot.interval_s;
         if complete {
             self.complete();
@@ -370,9 +359,7 @@ impl Observer {
             now.steady_s = 0.0;
         }
         self.history.push(now);
-        for (tracker, found) in self.trackers.iter().zip(&mut self.orders) {
-            tracker.write(found);
-        }
+        self.orders.sum_up();
     }
 
     /// Displacement along and across (left) the mean heading, m, and turn, rad.

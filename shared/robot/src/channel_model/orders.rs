@@ -18,6 +18,8 @@ pub const ORDERS: usize = 5;
 pub const MEMORIES_TURNS: [f64; 2] = [8.0, 32.0];
 /// Part of a memory that has to be filled before it says something.
 const FILLED: f64 = 0.5;
+/// Part of the last turns in which an order has to be seen, by squared steps.
+const SEEN: f64 = 0.5;
 /// Angle over which the mean is forgotten that is taken off a channel, twice, rad. Chosen: a
 /// change of speed is slower, the first order hardly weaker.
 const MEAN_RAD: f64 = 0.7;
@@ -25,9 +27,14 @@ const MEAN_RAD: f64 = 0.7;
 const BESIDE: [f64; 4] = [-0.42, -0.3, 0.3, 0.42];
 /// A reading of this magnitude or more is none: sums of it would not be finite for long.
 const READING_MAX: f64 = 1e100;
+/// A wheel whose rate was not read for this long stands, as far as anybody knows, s.
+const UNREAD_S: f64 = 0.5;
 /// Angle after which the phases of all orders and of what is beside them come back, rad: each of
 /// [`BESIDE`] is a multiple of a fiftieth.
 const PERIOD_RAD: f64 = 50.0 * TAU;
+
+/// A number for each order.
+pub type ByOrder = [Complex<f64>; ORDERS];
 
 /// What the channels show in step with one wheel.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,46 +48,92 @@ pub struct WheelOrders {
     /// Amplitude of each channel in each order, in the channel's unit: order by order within each
     /// channel.
     pub amplitudes: Vec<Complex<f64>>,
-    /// Mean square of the amplitude beside each order, likewise.
-    pub beside: Vec<f64>,
+    /// Mean square of the amplitude beside each order, likewise; none if the last turns hardly show
+    /// it.
+    pub beside: Vec<Option<f64>>,
+    /// What comes back with the turns of another wheel shows here, too: by that wheel, its
+    /// amplitude here over that with its own wheel. As large on wheels that turn alike.
+    pub shared: Vec<(usize, ByOrder)>,
 }
 
 impl WheelOrders {
-    /// Nothing yet of so many channels.
-    #[must_use]
-    pub fn new(wheel: usize, memory_turns: f64, channels: usize) -> Self {
-        Self {
-            wheel,
-            memory_turns,
-            turns: 0.0,
-            amplitudes: vec![Complex::default(); ORDERS * channels],
-            beside: vec![0.0; ORDERS * channels],
-        }
-    }
-
     /// True if the wheel has turned far enough to say anything.
     #[must_use]
     pub fn is_told(&self) -> bool {
         self.turns >= FILLED * self.memory_turns
     }
+
+    /// How much larger the amplitude is of what comes back since the record began than with the
+    /// shortest memory after many turns.
+    #[must_use]
+    pub fn growth(&self) -> f64 {
+        self.growth_since(self.turns)
+    }
+
+    /// The same of what comes back in so many turns, the last ones.
+    #[must_use]
+    pub fn growth_since(&self, turns: f64) -> f64 {
+        // Of t turns in a record of n, with a memory of m, the sum of their weights over the root
+        // of that of all squares is √(2m) (1 - e^{-t/m}) / √(1 - e^{-2n/m}).
+        let gone = |turns: f64| 1.0 - (-turns / self.memory_turns).exp();
+        let longer = self.memory_turns / MEMORIES_TURNS[0];
+        longer.sqrt() * over(gone(turns), gone(2.0 * self.turns).sqrt())
+    }
+
+    /// What the turns of another wheel leave here.
+    #[must_use]
+    pub fn shared_with(&self, wheel: usize) -> ByOrder {
+        let shared = self.shared.iter().find(|(other, _)| *other == wheel);
+        shared.map_or_else(ByOrder::default, |(_, by_order)| *by_order)
+    }
 }
 
-/// Sums of one channel and order: at the order, and beside it.
+/// Sums of one channel and order: at the order, beside it, and of the squared steps in which it was
+/// seen.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     at: Complex<f64>,
     beside: [Complex<f64>; BESIDE.len()],
+    square: f64,
 }
 
-/// Means that are taken off a channel; none before its first reading.
+impl Sums {
+    /// Forgets all but a part.
+    fn fade(&mut self, kept: f64) {
+        self.at *= kept;
+        self.beside.iter_mut().for_each(|sum| *sum *= kept);
+        self.square *= kept * kept;
+    }
+
+    /// Adds what a step of so much angle shows in a phase of the order.
+    fn add(&mut self, angle_rad: f64, shown: Complex<f64>, aside: &[Complex<f64>; BESIDE.len()]) {
+        self.at += shown * angle_rad;
+        for (sum, aside) in self.beside.iter_mut().zip(aside) {
+            *sum += shown * aside * angle_rad;
+        }
+        self.square += angle_rad * angle_rad;
+    }
+}
+
+/// Means that are taken off a channel.
 #[derive(Debug, Clone, Copy, Default)]
-struct Means(Option<[f64; 2]>);
+struct Means {
+    /// Of the readings, and of what is left once that is taken off; none before the first reading.
+    means: Option<[f64; 2]>,
+    /// Angle since the last reading, rad.
+    since_rad: f64,
+}
+
+/// Part of the newest reading in a mean, so much of a turn after the last one.
+fn newest_part(angle_rad: f64) -> f64 {
+    1.0 - (-angle_rad / MEAN_RAD).exp()
+}
 
 impl Means {
-    /// What is left of a reading once the means of the last `angle_rad` are taken off.
-    fn taken_off(&mut self, reading: f64, angle_rad: f64) -> f64 {
-        let [mean, rest] = self.0.get_or_insert([reading, 0.0]);
-        let part = 1.0 - (-angle_rad / MEAN_RAD).exp();
+    /// What is left of a reading once the means are taken off.
+    fn taken_off(&mut self, reading: f64) -> f64 {
+        let part = newest_part(std::mem::take(&mut self.since_rad));
+        let [mean, rest] = self.means.get_or_insert([reading, 0.0]);
         let once = reading - *mean;
         *mean += part * once;
         let twice = once - *rest;
@@ -89,207 +142,260 @@ impl Means {
     }
 }
 
-/// Follows the turns of one wheel.
+/// What turns an order back by as much as the means that were taken off turned it. They lag behind
+/// along the way: against the sense of the wheel on the way back, so that both ways would cancel.
+fn turned_back(order: usize, step_rad: f64) -> Complex<f64> {
+    let one = Complex::new(1.0, 0.0);
+    let z = Complex::from_polar(1.0, -((order + 1) as f64) * step_rad.abs());
+    let passed = (one - z) / (one - z * (1.0 - newest_part(step_rad.abs())));
+    Complex::from_polar(1.0, -step_rad.signum() * 2.0 * passed.arg())
+}
+
+/// How a wheel turns.
 #[derive(Debug, Clone)]
-pub(super) struct OrderTracker {
+struct Turns {
     /// Place of the wheel's rate among the channels.
     rate: usize,
-    memory_turns: f64,
+    wheel: usize,
     rate_rad_s: f64,
+    unread_s: f64,
+    /// Angle of the newest frame, rad.
+    step_rad: f64,
     angle_rad: f64,
-    means: Vec<Means>,
-    sums: Vec<Sums>,
-    /// Sums of the squared steps, by order.
-    squares: [f64; ORDERS],
     turns: f64,
 }
 
-impl OrderTracker {
-    /// Of a wheel whose rate is at this place among so many channels.
-    pub fn new(rate: usize, memory_turns: f64, channels: usize) -> Self {
+impl Turns {
+    const fn new(rate: usize, wheel: usize) -> Self {
         Self {
             rate,
-            memory_turns,
+            wheel,
             rate_rad_s: 0.0,
+            unread_s: 0.0,
+            step_rad: 0.0,
             angle_rad: 0.0,
-            means: vec![Means::default(); channels],
-            sums: vec![Sums::default(); ORDERS * channels],
-            squares: [0.0; ORDERS],
             turns: 0.0,
+        }
+    }
+
+    /// Turns on for `dt_s`: a wheel whose rate is not read as before for a while.
+    fn turn(&mut self, dt_s: f64, readings: &[Option<f64>; CHANNELS_MAX]) {
+        self.unread_s += dt_s;
+        match readings[self.rate] {
+            Some(rate_rad_s) => (self.rate_rad_s, self.unread_s) = (rate_rad_s, 0.0),
+            None if self.unread_s >= UNREAD_S => self.rate_rad_s = 0.0,
+            None => {}
+        }
+        self.step_rad = self.rate_rad_s * dt_s;
+        self.angle_rad = (self.angle_rad + self.step_rad) % PERIOD_RAD;
+        self.turns += self.step_rad.abs() / TAU;
+    }
+}
+
+/// What one wheel shows of a frame.
+struct Shown {
+    angle_rad: f64,
+    /// Phases of the orders that frames are often enough for.
+    phases: ByOrder,
+    seen: usize,
+    aside: [Complex<f64>; BESIDE.len()],
+    /// What is left of the channels once their means are taken off.
+    left: [Option<f64>; CHANNELS_MAX],
+}
+
+impl Shown {
+    fn new(turns: &Turns, means: &mut [Means], readings: &[Option<f64>; CHANNELS_MAX]) -> Self {
+        let angle_rad = turns.step_rad.abs();
+        let mut left = [None; CHANNELS_MAX];
+        for ((left, means), reading) in left.iter_mut().zip(means).zip(readings) {
+            means.since_rad += angle_rad;
+            let reading = reading.filter(|reading| reading.abs() < READING_MAX);
+            *left = reading.map(|reading| means.taken_off(reading));
+        }
+        let phase = |order: usize| {
+            let turn = Complex::from_polar(1.0, -((order + 1) as f64) * turns.angle_rad);
+            turn * turned_back(order, turns.step_rad)
+        };
+        // An order that comes back within two frames is not seen.
+        let seen = (0..ORDERS).filter(|order| (*order as f64 + 1.5) * angle_rad < PI);
+        let seen = if angle_rad > 0.0 { seen.count() } else { 0 };
+        Self {
+            angle_rad,
+            phases: std::array::from_fn(|order| match order < seen {
+                true => phase(order),
+                false => Complex::default(),
+            }),
+            seen,
+            aside: BESIDE.map(|order| Complex::from_polar(1.0, -order * turns.angle_rad)),
+            left,
+        }
+    }
+}
+
+/// What is remembered of one wheel's turns.
+#[derive(Debug, Clone)]
+struct Memory {
+    turns: f64,
+    sums: Vec<Sums>,
+    /// Sums of all steps and of their squares.
+    length: f64,
+    square: f64,
+    /// For each wheel what is left of its turns in the orders of this one.
+    shared: Vec<ByOrder>,
+}
+
+impl Memory {
+    fn new(turns: f64, wheels: usize, channels: usize) -> Self {
+        Self {
+            turns,
+            sums: vec![Sums::default(); ORDERS * channels],
+            length: 0.0,
+            square: 0.0,
+            shared: vec![ByOrder::default(); wheels],
+        }
+    }
+
+    fn clear(&mut self) {
+        self.sums.fill(Sums::default());
+        self.shared.fill(ByOrder::default());
+        (self.length, self.square) = (0.0, 0.0);
+    }
+
+    fn take(&mut self, own: usize, all: &[Turns], shown: &Shown) {
+        let angle_rad = shown.angle_rad;
+        let kept = (-angle_rad / (TAU * self.turns)).exp();
+        self.length = kept * self.length + angle_rad;
+        self.square = kept * kept * self.square + angle_rad * angle_rad;
+        for (sums, left) in self.sums.chunks_mut(ORDERS).zip(&shown.left) {
+            for (order, sums) in sums.iter_mut().enumerate() {
+                sums.fade(kept);
+                if let Some(left) = left.filter(|_| order < shown.seen) {
+                    sums.add(angle_rad, shown.phases[order] * left, &shown.aside);
+                }
+            }
+        }
+        for (shared, other) in self.shared.iter_mut().zip(all) {
+            let apart_rad = other.angle_rad - all[own].angle_rad;
+            for (order, sum) in shared.iter_mut().enumerate() {
+                let phase = Complex::from_polar(angle_rad, (order + 1) as f64 * apart_rad);
+                *sum = *sum * kept + phase;
+            }
+        }
+    }
+
+    /// Amplitude of an order of which each unit reading says one, over that of noise.
+    fn gain(&self) -> f64 {
+        over(self.length, self.square.sqrt())
+    }
+}
+
+fn over(numerator: f64, denominator: f64) -> f64 {
+    if denominator > 0.0 {
+        numerator / denominator
+    } else {
+        0.0
+    }
+}
+
+/// One wheel.
+#[derive(Debug, Clone)]
+struct TrackedWheel {
+    means: Vec<Means>,
+    memories: [Memory; MEMORIES_TURNS.len()],
+}
+
+/// Follows the turns of wheels.
+#[derive(Debug, Clone)]
+pub(super) struct OrderTracker {
+    turns: Vec<Turns>,
+    wheels: Vec<TrackedWheel>,
+    found: Vec<WheelOrders>,
+}
+
+impl OrderTracker {
+    /// Of wheels whose rates are at these places among so many channels.
+    pub fn new(rates: &[(usize, usize)], channels: usize) -> Self {
+        let turns: Vec<Turns> = rates
+            .iter()
+            .map(|&(rate, wheel)| Turns::new(rate, wheel))
+            .collect();
+        let tracked = || TrackedWheel {
+            means: vec![Means::default(); channels],
+            memories: MEMORIES_TURNS.map(|memory| Memory::new(memory, rates.len(), channels)),
+        };
+        let orders = |(turns, memory_turns): (&Turns, f64)| WheelOrders {
+            wheel: turns.wheel,
+            memory_turns,
+            turns: 0.0,
+            amplitudes: vec![Complex::default(); ORDERS * channels],
+            beside: vec![None; ORDERS * channels],
+            shared: rates
+                .iter()
+                .map(|&(_, wheel)| (wheel, ByOrder::default()))
+                .collect(),
+        };
+        let all = turns.iter();
+        Self {
+            found: all
+                .flat_map(|turns| MEMORIES_TURNS.map(|memory| orders((turns, memory))))
+                .collect(),
+            wheels: turns.iter().map(|_| tracked()).collect(),
+            turns,
         }
     }
 
     /// Begins a new record.
     pub fn clear(&mut self) {
-        (self.rate_rad_s, self.angle_rad, self.turns) = (0.0, 0.0, 0.0);
-        self.means.fill(Means::default());
-        self.sums.fill(Sums::default());
-        self.squares = [0.0; ORDERS];
+        for turns in &mut self.turns {
+            *turns = Turns::new(turns.rate, turns.wheel);
+        }
+        for wheel in &mut self.wheels {
+            wheel.means.fill(Means::default());
+            wheel.memories.iter_mut().for_each(Memory::clear);
+        }
     }
 
-    /// Takes the readings of a frame that comes `dt_s` after the last one. A wheel whose rate is
-    /// not read turns on as before.
+    /// Takes the readings of a frame that comes `dt_s` after the last one.
     pub fn take(&mut self, dt_s: f64, readings: &[Option<f64>; CHANNELS_MAX]) {
-        self.rate_rad_s = readings[self.rate].unwrap_or(self.rate_rad_s);
-        let step_rad = self.rate_rad_s * dt_s;
-        let angle_rad = step_rad.abs();
-        self.angle_rad = (self.angle_rad + step_rad) % PERIOD_RAD;
-        self.turns += angle_rad / TAU;
-        let kept = (-angle_rad / (TAU * self.memory_turns)).exp();
-        // An order that comes back within two frames is not seen.
-        let seen = (0..ORDERS).filter(|h| (*h as f64 + 1.5) * angle_rad < PI);
-        let seen = seen.count();
-        for (h, square) in self.squares.iter_mut().enumerate() {
-            let more = if h < seen { angle_rad * angle_rad } else { 0.0 };
-            *square = kept * kept * *square + more;
+        for turns in &mut self.turns {
+            turns.turn(dt_s, readings);
         }
-        let turn = Complex::from_polar(1.0, -self.angle_rad);
-        let aside = BESIDE.map(|order| Complex::from_polar(1.0, -order * self.angle_rad));
-        for (channel, means) in self.means.iter_mut().enumerate() {
-            let reading = readings[channel].filter(|reading| reading.abs() < READING_MAX);
-            let left = reading.map_or(0.0, |reading| means.taken_off(reading, angle_rad));
-            let mut phase = turn;
-            let sums = &mut self.sums[ORDERS * channel..][..ORDERS];
-            for (h, sums) in sums.iter_mut().enumerate() {
-                let more = if h < seen {
-                    phase * (angle_rad * left)
-                } else {
-                    Complex::default()
-                };
-                sums.at = sums.at * kept + more;
-                for (sum, aside) in sums.beside.iter_mut().zip(aside) {
-                    *sum = *sum * kept + more * aside;
-                }
-                phase *= turn;
+        for (own, wheel) in self.wheels.iter_mut().enumerate() {
+            let shown = Shown::new(&self.turns[own], &mut wheel.means, readings);
+            for memory in &mut wheel.memories {
+                memory.take(own, &self.turns, &shown);
             }
         }
     }
 
-    /// Writes what the last turns show.
-    pub fn write(&self, found: &mut WheelOrders) {
-        found.turns = self.turns;
-        for (i, sums) in self.sums.iter().enumerate() {
-            let square = self.squares[i % ORDERS];
-            let per = if square > 0.0 { 1.0 / square } else { 0.0 };
-            found.amplitudes[i] = sums.at * per.sqrt();
-            let beside: f64 = sums.beside.iter().map(Complex::norm_sqr).sum();
-            found.beside[i] = per * beside / BESIDE.len() as f64;
+    /// What the last turns showed when it was summed up last: of each wheel with each of
+    /// [`MEMORIES_TURNS`].
+    pub fn found(&self) -> &[WheelOrders] {
+        &self.found
+    }
+
+    /// Sums up what the last turns show.
+    pub fn sum_up(&mut self) {
+        for (i, found) in self.found.iter_mut().enumerate() {
+            let (own, of) = (i / MEMORIES_TURNS.len(), i % MEMORIES_TURNS.len());
+            let memory = &self.wheels[own].memories[of];
+            found.turns = self.turns[own].turns;
+            let places = found.amplitudes.iter_mut().zip(&mut found.beside);
+            for ((amplitude, beside), sums) in places.zip(&memory.sums) {
+                let is_seen = sums.square > SEEN * memory.square;
+                let per = if is_seen { 1.0 / sums.square } else { 0.0 };
+                let square: f64 = sums.beside.iter().map(Complex::norm_sqr).sum();
+                *amplitude = sums.at * per.sqrt();
+                *beside = is_seen.then(|| per * square / BESIDE.len() as f64);
+            }
+            for (other, (_, shared)) in found.shared.iter_mut().enumerate() {
+                let gain = self.wheels[other].memories[of].gain();
+                let per = over(1.0, gain * memory.square.sqrt());
+                *shared = memory.shared[other].map(|sum| sum * per);
+            }
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const DT_S: f64 = 0.02;
-    const RATE_RAD_S: f64 = 8.0;
-
-    /// A wheel's rate, and what another channel reads at each angle.
-    fn turned(turns: f64, rate_rad_s: f64, dt_s: f64, reads: impl Fn(f64) -> f64) -> WheelOrders {
-        let mut tracker = OrderTracker::new(0, MEMORIES_TURNS[0], 2);
-        let mut angle_rad = 0.0_f64;
-        while angle_rad.abs() < TAU * turns {
-            angle_rad += rate_rad_s * dt_s;
-            let mut readings = [None; CHANNELS_MAX];
-            (readings[0], readings[1]) = (Some(rate_rad_s), Some(reads(angle_rad)));
-            tracker.take(dt_s, &readings);
-        }
-        let mut found = WheelOrders::new(0, MEMORIES_TURNS[0], 2);
-        tracker.write(&mut found);
-        found
-    }
-
-    #[test]
-    fn what_comes_back_three_times_a_turn_is_the_third_order() {
-        let found = turned(60.0, RATE_RAD_S, DT_S, |angle| 0.5 * (3.0 * angle).cos());
-        let amplitude = found.amplitudes[ORDERS + 2];
-        // Of A cos(hθ) over many turns half of A is left, times the root of the number of steps
-        // that are remembered: the square of a sum of powers over the sum of their squares. The
-        // mean that is taken off passes (1 - z) / (1 - (1 - a) z), with z = e^{-ihΔθ}, twice.
-        let step_rad = RATE_RAD_S * DT_S;
-        let kept = (-step_rad / (TAU * MEMORIES_TURNS[0])).exp();
-        let steps = (1.0 - kept * kept) / ((1.0 - kept) * (1.0 - kept));
-        let (one, z) = (
-            Complex::new(1.0, 0.0),
-            Complex::from_polar(1.0, -3.0 * step_rad),
-        );
-        let once = (one - z) / (one - z * (-step_rad / MEAN_RAD).exp());
-        let expected = once * once * 0.25 * steps.sqrt();
-        assert!(
-            (amplitude - expected).norm() < 0.01 * expected.norm(),
-            "{amplitude} {expected}"
-        );
-        let others = (0..ORDERS).filter(|h| *h != 2);
-        let aside = others.map(|h| found.amplitudes[ORDERS + h].norm());
-        assert!(
-            aside.fold(0.0, f64::max) < 0.1 * amplitude.norm(),
-            "{found:?}"
-        );
-        assert!((found.turns - 60.0).abs() < 0.1 && found.is_told());
-    }
-
-    #[test]
-    fn noise_is_as_large_at_an_order_as_beside_it() {
-        use rand::{RngExt, SeedableRng};
-        let (mut at, mut beside) = (0.0, 0.0);
-        for seed in 0..200 {
-            let rng = std::cell::RefCell::new(rand_pcg::Pcg64Mcg::seed_from_u64(seed));
-            let noise = |_| rng.borrow_mut().random_range(-1.0..1.0);
-            let found = turned(20.0, RATE_RAD_S, DT_S, noise);
-            at += found.amplitudes[ORDERS + 2].norm_sqr() / 200.0;
-            beside += found.beside[ORDERS + 2] / 200.0;
-        }
-        // The variance of uniform noise is 1/3; the mean that is taken off takes some of it.
-        assert!((at / beside - 1.0).abs() < 0.2, "{at} {beside}");
-        assert!((0.2..0.35).contains(&at), "{at}");
-    }
-
-    #[test]
-    fn a_wheel_at_rest_changes_nothing_and_one_turned_back_has_the_same_orders() {
-        let reads = |angle: f64| (2.0 * angle).cos();
-        let mut tracker = OrderTracker::new(0, MEMORIES_TURNS[0], 1);
-        let mut found = WheelOrders::new(0, MEMORIES_TURNS[0], 1);
-        let mut readings = [None; CHANNELS_MAX];
-        for _ in 0..500 {
-            readings[0] = Some(RATE_RAD_S);
-            tracker.take(DT_S, &readings);
-        }
-        tracker.write(&mut found);
-        let before = found.clone();
-        readings[0] = Some(0.0);
-        for _ in 0..500 {
-            tracker.take(DT_S, &readings);
-        }
-        tracker.write(&mut found);
-        assert_eq!(found, before);
-        let [forward, back] = [1.0, -1.0].map(|sign| turned(40.0, sign * RATE_RAD_S, DT_S, reads));
-        let norms = [forward, back].map(|found| found.amplitudes[ORDERS + 1].norm());
-        assert!((norms[0] / norms[1] - 1.0).abs() < 0.02, "{norms:?}");
-    }
-
-    #[test]
-    fn an_order_that_frames_are_too_rare_for_is_not_looked_at() {
-        // 1 rad a frame: the first two orders alone come back no sooner than every two frames.
-        let found = turned(60.0, 1.0, 1.0, |angle| (5.0 * angle).cos());
-        assert!(found.amplitudes[ORDERS + 1].norm() > 0.0);
-        assert!(
-            found.amplitudes[ORDERS + 2..]
-                .iter()
-                .all(|one| one.norm() == 0.0)
-        );
-    }
-
-    #[test]
-    fn no_reading_leaves_what_is_no_number() {
-        for wrong in [f64::MAX, -1e200, f64::NAN, f64::INFINITY, 1e99] {
-            let found = turned(20.0, RATE_RAD_S, DT_S, |angle| match angle < 30.0 {
-                true => wrong,
-                false => angle.sin(),
-            });
-            let sane = |one: &Complex<f64>| one.re.is_finite() && one.im.is_finite();
-            assert!(found.amplitudes.iter().all(sane), "{wrong}");
-            assert!(found.beside.iter().all(|one| one.is_finite()), "{wrong}");
-        }
-    }
-}
+mod tests;

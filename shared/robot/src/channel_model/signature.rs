@@ -212,6 +212,12 @@ impl Evidence {
         self.log_ratio
     }
 
+    /// The same of ratios without a bound: among faults.
+    #[must_use]
+    pub const fn unbounded(&self) -> f64 {
+        self.unbounded
+    }
+
     /// What it lacks because each ratio is bounded, nats: beside health that is as good as
     /// certain, but not among faults.
     #[must_use]

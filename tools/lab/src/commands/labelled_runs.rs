@@ -70,7 +70,9 @@ fn check_declared(label: &Label, robot: &Description) -> Result<(), CommandError
     let faults = robot.fault.iter();
     let declared: Vec<&str> = faults.map(|fault| fault.name.as_str()).collect();
     // Several at once teach nothing of any one of them.
-    if label.mode.split('+').all(|mode| declared.contains(&mode)) {
+    let modes: Vec<&str> = label.mode.split('+').collect();
+    let is_known = |i: usize| declared.contains(&modes[i]) && !modes[..i].contains(&modes[i]);
+    if (0..modes.len()).all(is_known) {
         return Ok(());
     }
     let contexts = robot.context.iter();
@@ -83,8 +85,8 @@ fn check_declared(label: &Label, robot: &Description) -> Result<(), CommandError
         _ => all.join(", "),
     };
     let message = format!(
-        "run {} has the mode '{}', which is no [[fault]] and no [[context]] of {}: it declares \
-         {declared}",
+        "run {} has the mode '{}', which is no [[fault]] of {}, no several of them with a '+' \
+         between, each once, and no [[context]]: it declares {declared}",
         label.run, label.mode, robot.name,
     );
     Err(CommandError::usage(message))

@@ -96,12 +96,14 @@ fn a_labelled_change_is_learned_told_and_scored_as_healthy() {
 
 #[test]
 fn a_label_that_is_neither_fault_nor_context_is_refused() {
-    let folder = workplace("water");
-    let refused = vigil(folder.path(), LEARN);
-    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert_eq!(refused.status.code(), Some(2), "{said}");
-    assert!(
-        said.contains("'water'") && said.contains("it declares ground"),
-        "{said}"
-    );
+    for wrong in ["water", "ground+ground"] {
+        let folder = workplace(wrong);
+        let refused = vigil(folder.path(), LEARN);
+        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(2), "{said}");
+        assert!(
+            said.contains(&format!("'{wrong}'")) && said.contains("it declares ground"),
+            "{said}"
+        );
+    }
 }

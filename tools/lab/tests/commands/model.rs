@@ -38,7 +38,7 @@ fn the_shipped_model_is_shown_as_text_and_as_one_document() {
     let shown = text(&["learn", "--show", "--model", MODEL]);
     for wanted in [
         "robot          rover (LF LM LR RF RM RR)",
-        "file layout    version 4",
+        "file layout    version 5",
         "frames         learn_frames.csv.gz",
         "labels         learn_runs.csv",
         "ground         soil",
@@ -212,7 +212,7 @@ fn a_model_of_channels_is_shown_and_an_edited_one_refused_in_the_same_way() {
     let shown = text(&["learn", "--show", "--model", CHANNELS]);
     for wanted in [
         "robot          kobuki",
-        "file layout    version 4",
+        "file layout    version 5",
         "frames         kobuki.csv.gz",
         "runs learned   1: 0",
         "of each run    the first 60 s",

@@ -23,6 +23,8 @@ mod turning;
 mod unseen;
 mod view;
 
+use std::collections::BTreeSet;
+
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_robot::channel_model::channel::lags;
@@ -283,9 +285,10 @@ fn provenance(log: &Log<'_>, learned: &[&Run], left_out: &[&Run]) -> Provenance 
     let labels: Vec<String> = labels.chain(changes).collect();
     let runs = log.labelled.iter().map(|label| label.run);
     let runs: Vec<&Run> = learned.iter().copied().chain(runs).collect();
+    let ids: BTreeSet<u32> = runs.iter().map(|run| run.id).collect();
     Provenance {
         data_hash: data_hash(&runs, log.until_s, &labels),
-        runs_learned: learned.iter().map(|run| run.id).collect(),
+        runs_learned: ids.into_iter().collect(),
         runs_held_out: left_out.iter().map(|run| run.id).collect(),
         until_s: log.until_s.is_finite().then_some(log.until_s),
         ..Provenance::default()

@@ -10,10 +10,12 @@ use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use nalgebra::Complex;
+use vigil_blocks::SensorFrame;
+use vigil_recording::frames::Run;
 use vigil_robot::Description;
-use vigil_robot::channel_model::orders::{MEMORIES_TURNS, ORDERS};
+use vigil_robot::channel_model::orders::{ByOrder, MEMORIES_TURNS, ORDERS};
 use vigil_robot::channel_model::turning::{
-    TurningSignature, TurningSignatures, WheelNoise, turned,
+    TurningFault, TurningSignature, TurningSignatures, WheelNoise, turned,
 };
 use vigil_robot::channel_model::{Model, WheelOrders};
 
@@ -34,6 +36,9 @@ const STEPS: usize = 72;
 const LOOKS_MIN: f64 = 3.0;
 /// Parts of the runs of a single group.
 const THIRDS: usize = 3;
+/// Deviations by which what comes back without a fault exceeds chance before a wheel counts as not
+/// round.
+const ROUND_DEVIATIONS: f64 = 2.0;
 
 /// What a wheel showed at the end of one observation.
 #[derive(Debug, Clone)]
@@ -42,6 +47,8 @@ struct Sight<'a> {
     dt_s: f64,
     /// How far the wheel has turned since the last sight, turns.
     turns: f64,
+    /// How much larger the fault's amplitude is than after many turns.
+    growth: f64,
     /// True if a new record begins.
     begins: bool,
     /// With the memory that is learned from.
@@ -64,6 +71,27 @@ struct Health<'a> {
     runs: Vec<Sample<'a>>,
 }
 
+/// A run of a fault, its group and what is seen of it.
+struct SeenRun {
+    group: String,
+    onset_s: f64,
+    records: Vec<Record>,
+}
+
+impl SeenRun {
+    fn samples(&self, wheel: usize) -> impl Iterator<Item = Sample<'_>> {
+        let sights = self
+            .records
+            .iter()
+            .map(move |record| after_onset(record, wheel, self.onset_s));
+        let shown = sights.filter(|sights| !sights.is_empty());
+        shown.map(|sights| Sample {
+            group: self.group.clone(),
+            sights,
+        })
+    }
+}
+
 /// Fits the turning signatures of `model`.
 pub(super) fn fit(
     model: &mut Model,
@@ -81,43 +109,35 @@ pub(super) fn fit(
         let Some(wheel) = robot.wheel_index(name) else {
             continue;
         };
-        let of_run = |label: &&LabelledRun<'_>| record::all(&[label.run], until_s, robot);
-        let seen: Vec<Vec<Record>> = labels.iter().map(of_run).collect();
-        let mut runs = Vec::new();
-        for (label, records) in labels.iter().zip(&seen) {
-            let group = record::group(label.run, groups);
-            for record in records {
-                let sights = after_onset(record, wheel, label.onset_s);
-                if !sights.is_empty() {
-                    runs.push(Sample {
-                        group: group.clone(),
-                        sights,
-                    });
-                }
-            }
-        }
+        let seen = labels.iter().map(|label| SeenRun {
+            group: record::group(label.run, groups),
+            onset_s: label.onset_s,
+            records: record::all(&[label.run], until_s, robot),
+        });
+        let seen: Vec<SeenRun> = seen.collect();
+        let runs: Vec<Sample<'_>> = seen.iter().flat_map(|run| run.samples(wheel)).collect();
+        let of_groups: BTreeSet<&String> = runs.iter().map(|run| &run.group).collect();
         let mut fit = FaultFit {
             fault: fault.name.clone(),
             wheel: Some(name.clone()),
             runs: labels.len(),
             runs_with_onset: runs.len(),
-            groups: runs
-                .iter()
-                .map(|run| &run.group)
-                .collect::<BTreeSet<_>>()
-                .len(),
+            groups: of_groups.len(),
             parts: runs.len(),
             runs_found: 0,
             is_used: false,
         };
         if let Some(health) = health(records, wheel, name) {
-            let parts = if fit.groups == 1 {
-                thirds(&runs)
+            (fit.runs_found, fit.parts) = if fit.groups == 1 {
+                let thirds = labels
+                    .iter()
+                    .flat_map(|label| thirds(label, until_s, robot));
+                let thirds: Vec<SeenRun> = thirds.collect();
+                let parts = thirds.iter().flat_map(|third| third.samples(wheel));
+                health.found(&parts.collect::<Vec<_>>())
             } else {
-                runs.clone()
+                health.found(&runs)
             };
-            fit.parts = parts.len();
-            fit.runs_found = health.found(&parts);
             let template = health.template(&runs.iter().collect::<Vec<_>>());
             let is_enough = fit.parts > 1 && 2 * fit.runs_found >= fit.parts;
             if let Some(template) = template.filter(|_| is_enough) {
@@ -133,6 +153,29 @@ pub(super) fn fit(
         told.push(fit);
     }
     told
+}
+
+/// What a run shows after its onset, cut into thirds: each as if it were a run of its own.
+fn thirds(label: &LabelledRun<'_>, until_s: f64, robot: &Description) -> Vec<SeenRun> {
+    let is_shown = |frame: &&SensorFrame| {
+        let t_s = frame.header.t_capture_ns as f64 * 1e-9;
+        (label.onset_s..=until_s).contains(&t_s)
+    };
+    let frames = label.run.frames.iter().filter(is_shown).copied();
+    let frames: Vec<SensorFrame> = frames.collect();
+    let length = frames.len().div_ceil(THIRDS).max(1);
+    let third = |(third, frames): (usize, &[SensorFrame])| {
+        let run = Run {
+            id: label.run.id,
+            frames: frames.to_vec(),
+        };
+        SeenRun {
+            group: format!("third {third}"),
+            onset_s: 0.0,
+            records: record::all(&[&run], until_s, robot),
+        }
+    };
+    frames.chunks(length).enumerate().map(third).collect()
 }
 
 /// Adds a signature, and the noise of its wheel.
@@ -161,10 +204,9 @@ fn signature((fault, runs): (&str, usize), template: &[Complex<f64>]) -> Turning
 fn sights(record: &Record, wheel: usize) -> Vec<(f64, Sight<'_>)> {
     let mut out = Vec::new();
     let mut before = 0.0;
-    for (history, orders) in record.histories.iter().zip(&record.orders) {
+    for (history, all) in record.histories.iter().zip(&record.orders) {
         let is_of = |one: &&WheelOrders| one.wheel == wheel && one.memory_turns == TURNS;
-        let all = orders;
-        let found = orders.iter().find(is_of);
+        let found = all.iter().find(is_of);
         let (Some(now), Some(orders)) = (history.ago(0), found) else {
             continue;
         };
@@ -174,6 +216,7 @@ fn sights(record: &Record, wheel: usize) -> Vec<(f64, Sight<'_>)> {
         let sight = Sight {
             dt_s: now.dt_s,
             turns,
+            growth: orders.growth(),
             begins,
             orders,
             all,
@@ -183,18 +226,21 @@ fn sights(record: &Record, wheel: usize) -> Vec<(f64, Sight<'_>)> {
     out
 }
 
-/// The sights of a run that show its fault: the turns before the onset are forgotten.
+/// The sights of a run that show its fault long enough to say something.
 fn after_onset(record: &Record, wheel: usize, onset_s: f64) -> Vec<Sight<'_>> {
-    let mut forgotten_at = 0.0;
+    let mut began_at = 0.0;
     let mut out = Vec::new();
-    for (t_s, sight) in sights(record, wheel) {
+    for (t_s, mut sight) in sights(record, wheel) {
         if sight.begins {
-            forgotten_at = 0.0;
+            began_at = 0.0;
         }
-        let turns = sight.orders.turns;
         if t_s < onset_s {
-            forgotten_at = turns + TURNS;
-        } else if turns >= forgotten_at && sight.orders.is_told() {
+            began_at = sight.orders.turns;
+            continue;
+        }
+        let turns = sight.orders.turns - began_at;
+        if turns >= 0.5 * TURNS {
+            sight.growth = sight.orders.growth_since(turns);
             out.push(sight);
         }
     }
@@ -203,61 +249,56 @@ fn after_onset(record: &Record, wheel: usize, onset_s: f64) -> Vec<Sight<'_>> {
 
 /// What a wheel shows in the log; none if it never turns far enough.
 fn health<'a>(records: &'a [Record], wheel: usize, name: &str) -> Option<Health<'a>> {
-    let run = |record: &'a Record| Sample {
-        group: String::new(),
-        sights: sights(record, wheel)
-            .into_iter()
-            .map(|(_, sight)| sight)
-            .filter(|sight| sight.orders.is_told())
-            .collect(),
+    let run = |record: &'a Record| {
+        let all = sights(record, wheel).into_iter().map(|(_, sight)| sight);
+        Sample {
+            group: String::new(),
+            sights: all.filter(|sight| sight.orders.is_told()).collect(),
+        }
     };
     let runs: Vec<Sample<'a>> = records.iter().map(run).collect();
     let all = || runs.iter().flat_map(|run| &run.sights);
     // A wheel at rest shows the same again: it counts by its turns.
     let turns: f64 = all().map(|sight| sight.turns).sum();
-    let mut squares = vec![0.0; all().next()?.orders.beside.len()];
-    for sight in all() {
-        for (square, beside) in squares.iter_mut().zip(&sight.orders.beside) {
-            *square += sight.turns / turns * beside;
+    let places = all().next()?.orders.beside.len();
+    let (mut squares, mut excess) = (Vec::new(), Vec::new());
+    for place in 0..places {
+        let (mut beside, mut grown, mut at, mut weight) = (0.0, 0.0, 0.0, 0.0);
+        for sight in all() {
+            let Some(square) = sight.orders.beside[place] else {
+                continue;
+            };
+            beside += sight.turns * square;
+            grown += sight.turns * square * sight.growth.powi(2);
+            at += sight.turns * sight.orders.amplitudes[place].norm_sqr();
+            weight += sight.turns;
         }
+        squares.push(if weight > 0.0 { beside / weight } else { 0.0 });
+        // Of so few independent looks this is chance.
+        let chance = ROUND_DEVIATIONS / (weight / (2.0 * TURNS)).sqrt();
+        let more = if grown > 0.0 {
+            (at - beside) / grown
+        } else {
+            0.0
+        };
+        excess.push(1.0 + (more - chance).max(0.0));
     }
     (turns > TURNS).then(|| Health {
         wheel,
         noise: WheelNoise {
             wheel: name.to_owned(),
             squares,
+            excess,
         },
         runs,
     })
 }
 
-/// Each run cut into thirds, the first turns of which are left out: they show the third before.
-fn thirds<'a>(runs: &[Sample<'a>]) -> Vec<Sample<'a>> {
-    let mut out = Vec::new();
-    for run in runs {
-        let turns: f64 = run.sights.iter().map(|sight| sight.turns).sum();
-        for third in 0..THIRDS {
-            let from = turns * third as f64 / THIRDS as f64;
-            let to = turns * (third + 1) as f64 / THIRDS as f64;
-            let from = if third == 0 { from } else { from + TURNS };
-            let mut turned = 0.0;
-            let is_within = |sight: &&Sight<'_>| {
-                turned += sight.turns;
-                (from..=to).contains(&turned)
-            };
-            out.push(Sample {
-                group: format!("third {third}"),
-                sights: run.sights.iter().filter(is_within).cloned().collect(),
-            });
-        }
-    }
-    out.retain(|third| !third.sights.is_empty());
-    out
-}
-
-/// Mean of successive standardized amplitudes.
+/// Amplitude of a fault after many turns, standardized, from successive sights of it.
 struct Piece {
     turns: f64,
+    /// Turns, by the square of what they show of the fault.
+    weight: f64,
     mean: Vec<Complex<f64>>,
 }
 
@@ -269,72 +310,83 @@ impl Health<'_> {
             if sight.begins || is_full {
                 out.push(Piece {
                     turns: 0.0,
+                    weight: 0.0,
                     mean: vec![Complex::default(); sight.orders.amplitudes.len()],
                 });
             }
             let Some(last) = out.last_mut().filter(|_| sight.turns > 0.0) else {
                 continue;
             };
+            let weight = sight.turns * sight.growth.powi(2);
             last.turns += sight.turns;
-            let part = sight.turns / last.turns;
+            last.weight += weight;
+            let part = weight / last.weight;
             for (place, mean) in last.mean.iter_mut().enumerate() {
-                *mean += (self.noise.standardized(sight.orders, place) - *mean) * part;
+                let amplitude = sight.orders.amplitudes[place] / sight.growth;
+                let deviation = self.noise.deviation(sight.orders, place);
+                let found = deviation.map_or_else(Complex::default, |sd| amplitude / sd);
+                *mean += (found - *mean) * part;
             }
         }
-        out.retain(|piece| piece.turns > 0.0);
+        out.retain(|piece| piece.weight > 0.0);
         out
     }
 
     /// What these runs have in common; none if they show nothing.
     fn template(&self, runs: &[&Sample<'_>]) -> Option<Vec<Complex<f64>>> {
         let mut pieces: Vec<Piece> = runs.iter().flat_map(|run| self.pieces(run)).collect();
-        pieces.sort_by(|a, b| b.turns.total_cmp(&a.turns));
-        let turns: f64 = pieces.iter().map(|piece| piece.turns).sum();
+        pieces.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        let weight: f64 = pieces.iter().map(|piece| piece.weight).sum();
         let of = |start: &Piece| in_agreement(&pieces, &start.mean);
         let found = pieces.iter().take(STARTS).map(of);
         let mut template = found.max_by(|a, b| square(a).total_cmp(&square(b)))?;
-        let noise = 1.0 / (turns / TURNS).max(LOOKS_MIN);
+        // Sights within twice the memory are as good as one.
+        let noise = 1.0 / (weight / (2.0 * TURNS)).max(LOOKS_MIN);
         for one in &mut template {
             *one *= (1.0 - noise / one.norm_sqr().max(noise)).max(0.0);
         }
         Some(template)
     }
 
-    /// How many of these runs are found by what the runs of the other groups have in common.
-    fn found(&self, runs: &[Sample<'_>]) -> usize {
+    /// How many of these runs are found by what the runs of the other groups have in common, and
+    /// how many there are.
+    fn found(&self, runs: &[Sample<'_>]) -> (usize, usize) {
         let learn = |others: &[&Sample<'_>]| {
-            let signature = signature(("", others.len()), &self.template(others)?);
-            let healthy = self.runs.iter().map(|run| self.highest(&signature, run));
+            let fault = TurningFault {
+                wheel: self.wheel,
+                noise: self.noise.clone(),
+                signature: signature(("", others.len()), &self.template(others)?),
+            };
+            let healthy = self.runs.iter().map(|run| highest_of(&fault, run));
             let threshold = threshold(healthy.fold(0.0, f64::max));
-            Some((signature, threshold))
+            Some((fault, threshold))
         };
-        let runs: Vec<&Sample<'_>> = runs.iter().collect();
-        found_unseen(
-            &runs,
+        let all: Vec<&Sample<'_>> = runs.iter().collect();
+        let found = found_unseen(
+            &all,
             |run| &run.group,
             learn,
-            |(signature, threshold), run| self.highest(signature, run) > *threshold,
-        )
+            |(fault, threshold), run| highest_of(fault, run) > *threshold,
+        );
+        (found, runs.len())
     }
+}
 
-    /// The highest evidence for a signature in a run.
-    fn highest(&self, signature: &TurningSignature, run: &Sample<'_>) -> f64 {
-        highest(run.sights.iter().filter_map(|sight| {
-            let log_ratio = signature.log_ratio(&self.noise, self.wheel, sight.all)?;
-            Some((log_ratio, sight.dt_s))
-        }))
-    }
+/// The highest evidence for a fault in a run.
+fn highest_of(fault: &TurningFault, run: &Sample<'_>) -> f64 {
+    let ratio = |sight: &Sight<'_>| Some((fault.log_ratio(sight.all)?, sight.dt_s));
+    highest(run.sights.iter().filter_map(ratio))
 }
 
 /// Mean of pieces, each turned so that it agrees with the others; at first with `start`.
 fn in_agreement(pieces: &[Piece], start: &[Complex<f64>]) -> Vec<Complex<f64>> {
-    let turns: f64 = pieces.iter().map(|piece| piece.turns).sum();
+    let weight: f64 = pieces.iter().map(|piece| piece.weight).sum();
     let mut template = start.to_vec();
     for _ in 0..ROUNDS {
         let mut mean = vec![Complex::default(); template.len()];
         for piece in pieces {
             let by = Complex::from_polar(1.0, agreeing_rad(&template, &piece.mean));
-            let part = piece.turns / turns;
+            let part = piece.weight / weight;
             for (place, (mean, one)) in mean.iter_mut().zip(&piece.mean).enumerate() {
                 *mean += one * by.powi((place % ORDERS) as i32 + 1) * part;
             }
@@ -350,7 +402,7 @@ fn square(template: &[Complex<f64>]) -> f64 {
 
 /// By how much to turn on a wheel so that its amplitudes agree most with a template, rad.
 fn agreeing_rad(template: &[Complex<f64>], found: &[Complex<f64>]) -> f64 {
-    let mut along = [Complex::default(); ORDERS];
+    let mut along = ByOrder::default();
     for (place, (a, b)) in template.iter().zip(found).enumerate() {
         along[place % ORDERS] += a.conj() * b;
     }

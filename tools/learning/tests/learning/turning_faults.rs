@@ -17,6 +17,30 @@ const RATE_HZ: f64 = 50.0;
 /// Deviation of the noise: of a wheel's rate, rad/s, and of a current, A.
 const NOISE: [f64; 2] = [0.1, 0.02];
 
+/// How a wheel drives.
+type Drive = fn(u64) -> [f64; 2];
+
+/// Both ways round, at many speeds.
+fn curves(step: u64) -> [f64; 2] {
+    let at = |of: u64| (step * of % 11) as f64 / 10.0;
+    match step % 8 {
+        7 => [0.0, 0.0],
+        _ => [0.3 + 0.4 * at(3), 0.8 * at(7) - 0.4],
+    }
+}
+
+/// Forward and back again.
+fn there_and_back(step: u64) -> [f64; 2] {
+    let [v, w] = curves(step);
+    let sense = if step % 4 < 2 { 1.0 } else { -1.0 };
+    [sense * v, w]
+}
+
+/// Straight on: the wheels turn alike.
+fn straight(step: u64) -> [f64; 2] {
+    [curves(step)[0], 0.0]
+}
+
 fn robot() -> Description {
     small(
         "measured = { pose = false, wheel_rates = true, steer = false, currents = true }\n\
@@ -27,22 +51,22 @@ fn robot() -> Description {
 
 /// A run in which the tyres are flat from `onset_s` on: by so much of the noise.
 fn run(id: u32, length_s: f64, flat: [f64; 2], onset_s: f64) -> Run {
+    driven(id, length_s, (flat, onset_s), curves)
+}
+
+fn driven(id: u32, length_s: f64, (flat, onset_s): ([f64; 2], f64), drive: Drive) -> Run {
     let mut rng = Pcg64Mcg::seed_from_u64(u64::from(id));
     let mut angles = [0.0, 0.0].map(|_: f64| rng.random_range(0.0..6.0));
     let mut frames = Vec::new();
     for i in 0..(length_s * RATE_HZ) as u64 {
         let t_s = i as f64 / RATE_HZ;
-        let step = (t_s / 4.0) as u64;
-        let at = |of: u64| (step * of % 11) as f64 / 10.0;
-        let [v, w] = match step % 8 {
-            7 => [0.0, 0.0],
-            _ => [0.3 + 0.4 * at(3), 0.8 * at(7) - 0.4],
-        };
+        let [v, w] = drive((t_s / 4.0) as u64);
         let mut frame = SensorFrame::default();
         frame.header.t_capture_ns = (t_s * 1e9) as u64;
         (frame.header.seq, frame.run_id) = (i, u64::from(id) + 1);
         frame.set_command(0, v);
         frame.set_command(1, w);
+        let angles_before = angles;
         for wheel in 0..2 {
             let side = [0.1, -0.1][wheel];
             let told = (v - side * w) / 0.1;
@@ -50,7 +74,12 @@ fn run(id: u32, length_s: f64, flat: [f64; 2], onset_s: f64) -> Run {
             let angle: f64 = angles[wheel];
             let noise = NOISE.map(|sd| sd * rng.sample::<f64, _>(StandardNormal));
             let shakes = size * NOISE[0] * ((2.0 * angle).cos() + 0.5 * (angle + 1.0).sin());
-            let draws = size * NOISE[1] * (angle - 0.5).cos();
+            // Both drives are on one supply.
+            let draws = [0, 1].map(|i| {
+                let size = if t_s >= onset_s { flat[i] } else { 0.0 };
+                size * NOISE[1] * f64::cos(angles_before[i] - 0.5)
+            });
+            let draws = draws[wheel] + 0.8 * draws[1 - wheel];
             let turns = f64::from(told != 0.0);
             let rate = told + turns * shakes;
             angles[wheel] += rate / RATE_HZ;
@@ -64,7 +93,10 @@ fn run(id: u32, length_s: f64, flat: [f64; 2], onset_s: f64) -> Run {
 
 /// A model of ten healthy minutes and of these runs, all flat from their beginning.
 fn learned(robot: &Description, flat: &[(Run, &str)]) -> (Model, Report) {
-    let healthy = [run(0, 600.0, [0.0; 2], 0.0)];
+    learned_from(robot, &run(0, 600.0, [0.0; 2], 0.0), flat)
+}
+
+fn learned_from(robot: &Description, healthy: &Run, flat: &[(Run, &str)]) -> (Model, Report) {
     let label = |(run, fault): &'_ (Run, &'_ str)| (run.clone(), (*fault).to_owned());
     let owned: Vec<(Run, String)> = flat.iter().map(label).collect();
     let labelled: Vec<LabelledRun<'_>> = owned
@@ -77,7 +109,7 @@ fn learned(robot: &Description, flat: &[(Run, &str)]) -> (Model, Report) {
         .collect();
     let log = Log {
         labelled: &labelled,
-        ..Log::of_healthy(&healthy)
+        ..Log::of_healthy(std::slice::from_ref(healthy))
     };
     learn(&log, robot).unwrap()
 }
@@ -193,4 +225,64 @@ fn runs_that_show_nothing_teach_nothing() {
             .to_string()
             .contains("no run shows turns of L")
     );
+}
+
+#[test]
+fn a_robot_that_often_turns_back_is_helped_as_well() {
+    let robot = robot();
+    let (model, _) = learned(&robot, &usual_runs());
+    let of = |flat| {
+        found(
+            &model,
+            &robot,
+            &driven(60, 120.0, (flat, 40.0), there_and_back),
+        )
+    };
+    let (alarm_s, [left, right], both) = of([1.0, 0.0]);
+    let alarms = 40.0..70.0;
+    assert!(
+        alarm_s.is_some_and(|t_s| alarms.contains(&t_s)),
+        "{alarm_s:?}"
+    );
+    assert!(left > 0.9, "{left} {right} {both}");
+}
+
+#[test]
+fn one_tyre_alone_is_named_while_the_wheels_turn_alike() {
+    let robot = robot();
+    let (model, _) = learned(&robot, &usual_runs());
+    for size in [1.0, 3.0] {
+        let flat = driven(61, 120.0, ([size, 0.0], 40.0), straight);
+        let (_, [left, right], both) = found(&model, &robot, &flat);
+        assert!(left > 0.9, "{size}: {left} {right} {both}");
+    }
+}
+
+#[test]
+fn evidence_outlasts_a_gap_of_the_record() {
+    let robot = robot();
+    let (model, _) = learned(&robot, &usual_runs());
+    let mut with_gap = run(62, 122.0, [1.0, 0.0], 40.0);
+    with_gap.frames.retain(|frame| {
+        let t_s = frame.header.t_capture_ns as f64 * 1e-9;
+        !(117.0..119.0).contains(&t_s)
+    });
+    let (_, [left, right], both) = found(&model, &robot, &with_gap);
+    assert!(left > 0.9, "{left} {right} {both}");
+}
+
+#[test]
+fn wheels_that_were_never_round_raise_no_alarm_and_flat_ones_still_do() {
+    let robot = robot();
+    let usual = 0.3;
+    let healthy = run(0, 600.0, [usual; 2], 0.0);
+    let flat = (1..4).map(|id| (run(id, 60.0, [1.0 + usual, usual], 0.0), "LEFT"));
+    let (model, report) = learned_from(&robot, &healthy, &flat.collect::<Vec<_>>());
+    assert!(report.faults[0].is_used, "{}", report.faults[0]);
+    for id in 70..72 {
+        let (alarm_s, ..) = found(&model, &robot, &run(id, 600.0, [usual; 2], 0.0));
+        assert_eq!(alarm_s, None, "{id}");
+    }
+    let (_, [left, _], _) = found(&model, &robot, &run(72, 120.0, [1.0 + usual, usual], 0.0));
+    assert!(left > 0.9, "{left}");
 }
