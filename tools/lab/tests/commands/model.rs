@@ -38,7 +38,7 @@ fn the_shipped_model_is_shown_as_text_and_as_one_document() {
     let shown = text(&["learn", "--show", "--model", MODEL]);
     for wanted in [
         "robot          rover (LF LM LR RF RM RR)",
-        "file layout    version 5",
+        "file layout    version 4",
         "frames         learn_frames.csv.gz",
         "labels         learn_runs.csv",
         "ground         soil",
