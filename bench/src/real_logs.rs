@@ -1,6 +1,5 @@
 //! Faults of sensors, put into logs of real robots that were not learned from.
 
-pub mod husky;
 pub mod injection;
 pub mod logs;
 pub mod split;

@@ -18,7 +18,7 @@ use super::scenario::{Scenario, Source};
 use super::timeline::Timeline;
 use super::watch::Watch;
 use crate::load;
-use crate::real_logs::{self, husky, logs};
+use crate::real_logs::{self, logs};
 use crate::run_time::{period_s, span_s, time_s};
 use crate::simulated::{self, stages};
 
@@ -131,9 +131,10 @@ fn material(data: &Path, source: &Source) -> Result<Material, Box<dyn Error>> {
             learned(log.robot, halves, source.half.unwrap_or(1))
         }
         "husky" => {
-            let robot = husky::robot()?;
-            let runs = husky::runs(&robot)?;
-            learned(robot, runs, source.half.unwrap_or(1))
+            let log = logs::log("husky_boreal", "husky")?;
+            let ground = |name: &String| name.split('/').next().unwrap_or_default().to_owned();
+            let runs = log.names.iter().map(ground).zip(log.runs);
+            learned(log.robot, runs.collect(), source.half.unwrap_or(1))
         }
         other => Err(format!(
             "log '{other}': allowed are left-out, grounds, mujoco, kobuki, husky"

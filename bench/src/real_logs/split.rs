@@ -9,7 +9,7 @@ use vigil_robot::channel_model::{Model, tree::tree};
 use vigil_robot::{Description, RobotModel};
 use vigil_setup::Setup;
 
-use super::{husky, logs};
+use super::logs;
 use crate::load;
 
 /// Logs that are split.
@@ -62,11 +62,9 @@ impl Split {
                 )
             }
             "husky" => {
-                let robot = husky::robot()?;
-                let runs = husky::runs(&robot)?;
-                let runs: Vec<Run> = runs.into_iter().map(|(_, run)| run).collect();
-                let (learned, judged) = halves(&runs);
-                (robot, learned, judged)
+                let log = logs::log("husky_boreal", log)?;
+                let (learned, judged) = halves(&log.runs);
+                (log.robot, learned, judged)
             }
             other => return Err(format!("log '{other}': allowed are {}", LOGS.join(", ")).into()),
         };

@@ -175,7 +175,10 @@ fn cells(imported: &ImportedLog, robot: &Description) -> Vec<Motion> {
 
 /// The motion in the rows of one cell.
 fn motion(rows: &[Vec<f64>], robot: &Description, at: &dyn Fn(&str) -> Option<usize>) -> Motion {
-    let value = |row: &Vec<f64>, name: &str| row.get(1 + at(name)?).copied();
+    let value = |row: &Vec<f64>, name: &str| {
+        let value = row.get(1 + at(name)?).copied();
+        value.filter(|value| value.is_finite())
+    };
     let mean = |name: &str| {
         let values = rows
             .iter()

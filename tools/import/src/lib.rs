@@ -91,7 +91,10 @@ impl ImportedLog {
         let mut file = FrameWriter::create(path, &self.columns)?;
         for run in &self.runs {
             for row in &run.rows {
-                let values = row.iter().skip(1).map(|value| Some(*value));
+                let values = row
+                    .iter()
+                    .skip(1)
+                    .map(|value| Some(*value).filter(|value| value.is_finite()));
                 file.row(run.id, row.first().copied().unwrap_or(0.0), values)?;
             }
         }
@@ -129,7 +132,9 @@ fn frame(fields: &[(String, Field)], identity: [u64; 2], seq: usize, row: &[f64]
     let t_s = row.first().copied().unwrap_or(0.0);
     frame.header.t_capture_ns = (t_s * 1e9).round() as u64;
     for ((_, field), value) in fields.iter().zip(row.iter().skip(1)) {
-        field.put(*value, &mut frame);
+        if value.is_finite() {
+            field.put(*value, &mut frame);
+        }
     }
     frame
 }
@@ -141,7 +146,8 @@ pub struct ImportedRun {
     pub id: u32,
     /// File or folder that it came from, relative to the log's folder.
     pub name: String,
-    /// Frames: time since the first, s, then the values in the order of [`ImportedLog::columns`].
+    /// Frames: time since the first, s, then the values in the order of [`ImportedLog::columns`];
+    /// NaN where a channel was not measured. A frame of which nothing was measured is left out.
     pub rows: Vec<Vec<f64>>,
     /// Clocks that do not rise in its files.
     pub disorder: Vec<Disorder>,
@@ -235,7 +241,7 @@ pub fn import(
                 .collect(),
             id: id as u32,
             name: place.name(folder),
-            rows: grid.rows(log, &columns, &series)?,
+            rows: grid.rows(log, robot, &columns, &series)?,
         });
     }
     Ok(ImportedLog {

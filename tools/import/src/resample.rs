@@ -5,9 +5,13 @@ use std::path::Path;
 use super::ImportError;
 use super::description::{ChannelSource, LogDescription, Method};
 use super::series::{Series, wrapped};
+use vigil_robot::Description;
 
 /// Shortest run, s.
 const RUN_MIN_S: f64 = 1.0;
+/// A channel is not measured between samples further apart than so many usual periods and frames.
+const PAUSE_PERIODS: f64 = 2.5;
+const PAUSE_FRAMES: f64 = 1.5;
 
 /// The common clock of a run.
 pub(super) struct Grid {
@@ -46,25 +50,50 @@ impl Grid {
         })
     }
 
-    /// The frames: time since the start, then every channel.
+    /// The frames: time since the start, then every channel; NaN where one was not measured. The
+    /// rover's channels always are: there the last value stands.
     pub fn rows(
         &self,
         log: &LogDescription,
+        robot: &Description,
         columns: &[String],
         series: &[Series],
     ) -> Result<Vec<Vec<f64>>, ImportError> {
+        let mut is_measured = vec![false; self.count];
         let mut rows: Vec<Vec<f64>> = (0..self.count)
             .map(|i| vec![(i as f64 * self.period_s * 1e6).round() * 1e-6])
             .collect();
         for (channel, series) in log.in_order(columns).zip(series) {
             self.check(log, channel, series)?;
+            let is_told = channel.method == Method::Hold;
+            let period_s = series.period_s();
             for (i, row) in rows.iter_mut().enumerate() {
                 let t_s = self.start_s + i as f64 * self.period_s;
                 let value = self.value(channel, series, t_s);
-                row.push(if channel.angle { wrapped(value) } else { value });
+                let value = if channel.angle { wrapped(value) } else { value };
+                let pauses = !is_told && self.is_pause(series, period_s, t_s);
+                is_measured[i] |= !is_told && !pauses;
+                let is_lost = pauses && !robot.has_fault_models();
+                row.push(if is_lost { f64::NAN } else { value });
             }
         }
+        let mut is_measured = is_measured.into_iter();
+        rows.retain(|_| is_measured.next().unwrap_or(false));
         Ok(rows)
+    }
+
+    /// True if samples that usually follow each other in `period_s` pause: the last one is long
+    /// ago, and the next one far off.
+    fn is_pause(&self, series: &Series, period_s: f64, t_s: f64) -> bool {
+        let Some(last) = series.last_at(t_s) else {
+            return false;
+        };
+        let at = |i: usize| series.time_s.get(i).copied();
+        let (Some(from_s), Some(until_s)) = (at(last), at(last + 1)) else {
+            return false;
+        };
+        let longest_s = (PAUSE_PERIODS * period_s).max(PAUSE_FRAMES * self.period_s);
+        until_s - from_s > longest_s && t_s - from_s > period_s.max(self.period_s)
     }
 
     fn value(&self, channel: &ChannelSource, series: &Series, t_s: f64) -> f64 {

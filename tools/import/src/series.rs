@@ -350,6 +350,17 @@ impl Series {
             .checked_sub(1)
     }
 
+    /// Median time between two samples, s; 0 of fewer.
+    pub fn period_s(&self) -> f64 {
+        let mut apart: Vec<f64> = self
+            .time_s
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .collect();
+        apart.sort_by(f64::total_cmp);
+        apart.get(apart.len() / 2).copied().unwrap_or(0.0)
+    }
+
     /// The value on the line between the samples around `t_s`.
     pub fn between(&self, t_s: f64) -> Option<f64> {
         let before = self.last_at(t_s)?;

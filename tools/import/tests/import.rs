@@ -375,3 +375,61 @@ fn rows_out_of_order_are_put_in_order_and_counted() {
     assert_eq!((disorder.rows, disorder.first_row), (3, 101));
     assert!((disorder.back_s - 0.02).abs() < 1e-9, "{disorder:?}");
 }
+
+/// The frames of a run whose rows within these times, s, were not written.
+fn with_pauses(base: [f64; 2], gyro: [f64; 2]) -> Vec<Vec<f64>> {
+    let folder = TempDir::new().unwrap();
+    let run = folder.path().join("run0");
+    write(&run, |text| text);
+    let cut = |name: &str, skipped: usize, separator: char, scale: f64, [from, to]: [f64; 2]| {
+        let path = run.join(name);
+        let text = fs::read_to_string(&path).unwrap();
+        let is_kept = |(i, line): &(usize, &str)| {
+            let t_s = |line: &str| {
+                line.split(separator)
+                    .next()
+                    .unwrap()
+                    .parse::<f64>()
+                    .unwrap()
+            };
+            *i < skipped || !(from..to).contains(&(t_s(line) * scale))
+        };
+        let kept = text.lines().enumerate().filter(is_kept);
+        let kept: Vec<&str> = kept.map(|(_, line)| line).collect();
+        fs::write(&path, kept.join("\n")).unwrap();
+    };
+    cut("base.csv", 2, ';', 1e-3, base);
+    cut("gyro.csv", 1, ',', 1.0, gyro);
+    let mut log = log();
+    // Both clocks as they are.
+    for channel in &mut log.channel {
+        channel.delay_s = vigil_import::Delay::Given(0.0);
+    }
+    import(&log, &robot(), folder.path()).unwrap().runs[0]
+        .rows
+        .clone()
+}
+
+#[test]
+fn what_was_not_measured_in_a_pause_is_not_made_up() {
+    let never = [-1.0, -1.0];
+    let whole = with_pauses(never, never);
+    assert!(whole.iter().flatten().all(|value| value.is_finite()));
+    // The gyro alone is silent for a quarter of a second: columns v, w, enc_L, enc_R, yaw_rate.
+    let pause = [53.0, 53.25];
+    let partly = with_pauses(never, pause);
+    assert_eq!(partly.len(), whole.len());
+    let silent = partly.iter().filter(|row| row[5].is_nan()).count();
+    assert!((9..=13).contains(&silent), "{silent}");
+    assert!(
+        partly
+            .iter()
+            .all(|row| row[3].is_finite() && row[1].is_finite())
+    );
+    // Nothing is measured: there is no frame.
+    let none = with_pauses(pause, pause);
+    let lost = whole.len() - none.len();
+    assert!((8..=13).contains(&lost), "{lost}");
+    let longest = none.windows(2).map(|pair| pair[1][0] - pair[0][0]);
+    assert!(longest.fold(0.0, f64::max) > 0.15);
+}
