@@ -71,12 +71,11 @@ pub fn steps(window: &Window, seen: StepChannels) -> Steps {
         let before = whole
             .checked_sub(newest)
             .filter(|&count| count >= BEFORE_MIN)?;
-        let unit = 1.0 / (1.0 / newest as f64 + 1.0 / before as f64).sqrt();
         let mut step = [0.0; CHANNELS_MAX];
         for (step, row) in step.iter_mut().zip(&window.z).take(seen.channels) {
             let (older, newer) = row[BLOCKS - whole..].split_at(before);
-            if let (Some(older), Some(newer)) = (mean(older), mean(newer)) {
-                *step = unit * (newer - older);
+            if let (Some((older, before)), Some((newer, newest))) = (mean(older), mean(newer)) {
+                *step = (newer - older) / (1.0 / newest + 1.0 / before).sqrt();
             }
         }
         if seen.has_pose {
@@ -107,10 +106,11 @@ fn along_and_across(way: Velocity, forward: f64, left: f64) -> (f64, f64) {
     (cos * forward + sin * left, cos * left - sin * forward)
 }
 
-fn mean(values: &[Option<f64>]) -> Option<f64> {
+/// Mean of the blocks that are known, and their number.
+fn mean(values: &[Option<f64>]) -> Option<(f64, f64)> {
     let known = values.iter().flatten();
     let (sum, count) = known.fold((0.0, 0.0), |(sum, count), z| (sum + z, count + 1.0));
-    (count > 0.0).then(|| sum / count)
+    (count > 0.0).then(|| (sum / count, count))
 }
 
 /// A direction in which steps are larger with a change.
@@ -280,7 +280,7 @@ impl ChangeWatch {
         let Some((beyond, context, age)) = found.max_by(|a, b| a.0.total_cmp(&b.0)) else {
             return false;
         };
-        if beyond <= 0.0 {
+        if beyond.is_nan() || beyond <= 0.0 {
             return false;
         }
         let age_ns = (age as f64 * window.block_s() * 1e9) as u64;

@@ -54,8 +54,8 @@ pub enum Class {
     Shift,
     /// A declared fault, by its labelled runs.
     Signature,
-    /// A declared fault, by the turns of its wheel. Its law needs no tail: the noise is measured in
-    /// the same turns.
+    /// A declared fault, by the turns of its wheel. Its law has no tail: the variances are measured
+    /// in the same turns, and few turns of a log are independent.
     Turning,
     /// What no single fault explains.
     Unknown,
@@ -366,7 +366,7 @@ impl ModelFile for Model {
         if !self.turning.fits(count) {
             let found = format!("{} faults", self.turning.fault.len());
             let allowed = "at most 8 faults and 8 wheels, each with five numbers for each channel: \
-                           amplitudes up to 1e6, squares of 0 to 1e18, excesses of 1 to 1e18";
+                           amplitudes up to 1e6, squares and ripples of 0 to 1e18";
             return refuse("turning", found, allowed);
         }
         if !self.contexts.fits(count) {

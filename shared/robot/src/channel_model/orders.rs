@@ -5,6 +5,9 @@
 //! `θ`, divided by the root of `Σ Δθ²`, has the variance of `x` if the channel knows nothing of the
 //! wheel. Sums beside the order, at angles that no turn repeats, tell that variance in the same
 //! turns. All is a function of the angle: a wheel at rest changes nothing.
+//!
+//! Only what a wheel shows as it turns forward is summed. On the way back the same fault shows with
+//! another sign in one channel, and with the same in another.
 
 use std::f64::consts::{PI, TAU};
 
@@ -20,8 +23,8 @@ pub const MEMORIES_TURNS: [f64; 2] = [8.0, 32.0];
 const FILLED: f64 = 0.5;
 /// Part of the last turns in which an order has to be seen, by squared steps.
 const SEEN: f64 = 0.5;
-/// Angle over which the mean is forgotten that is taken off a channel, twice, rad. Chosen: a
-/// change of speed is slower, the first order hardly weaker.
+/// Angle over which the mean is forgotten that is taken off a channel, twice, rad. Chosen: changes
+/// of speed are slower. The first order keeps 0.4 of its amplitude, and so does the noise beside it.
 const MEAN_RAD: f64 = 0.7;
 /// Where beside an order the noise is looked for.
 const BESIDE: [f64; 4] = [-0.42, -0.3, 0.3, 0.42];
@@ -43,8 +46,11 @@ pub struct WheelOrders {
     pub wheel: usize,
     /// Turns over which sums are forgotten.
     pub memory_turns: f64,
-    /// How far it has turned in this record, either way, turns.
+    /// How far it has turned forward in this record, turns.
     pub turns: f64,
+    /// By how much the amplitude of what comes back exceeds that in a single frame: the root of the
+    /// number of frames that are remembered.
+    pub gain: f64,
     /// Amplitude of each channel in each order, in the channel's unit: order by order within each
     /// channel.
     pub amplitudes: Vec<Complex<f64>>,
@@ -63,21 +69,11 @@ impl WheelOrders {
         self.turns >= FILLED * self.memory_turns
     }
 
-    /// How much larger the amplitude is of what comes back since the record began than with the
-    /// shortest memory after many turns.
+    /// The gain of what came back only in so many turns, the last ones.
     #[must_use]
-    pub fn growth(&self) -> f64 {
-        self.growth_since(self.turns)
-    }
-
-    /// The same of what comes back in so many turns, the last ones.
-    #[must_use]
-    pub fn growth_since(&self, turns: f64) -> f64 {
-        // Of t turns in a record of n, with a memory of m, the sum of their weights over the root
-        // of that of all squares is √(2m) (1 - e^{-t/m}) / √(1 - e^{-2n/m}).
-        let gone = |turns: f64| 1.0 - (-turns / self.memory_turns).exp();
-        let longer = self.memory_turns / MEMORIES_TURNS[0];
-        longer.sqrt() * over(gone(turns), gone(2.0 * self.turns).sqrt())
+    pub fn gain_since(&self, turns: f64) -> f64 {
+        let remembered = |turns: f64| 1.0 - (-turns / self.memory_turns).exp();
+        self.gain * over(remembered(turns), remembered(self.turns))
     }
 
     /// What the turns of another wheel leave here.
@@ -124,15 +120,10 @@ struct Means {
     since_rad: f64,
 }
 
-/// Part of the newest reading in a mean, so much of a turn after the last one.
-fn newest_part(angle_rad: f64) -> f64 {
-    1.0 - (-angle_rad / MEAN_RAD).exp()
-}
-
 impl Means {
     /// What is left of a reading once the means are taken off.
     fn taken_off(&mut self, reading: f64) -> f64 {
-        let part = newest_part(std::mem::take(&mut self.since_rad));
+        let part = 1.0 - (-std::mem::take(&mut self.since_rad) / MEAN_RAD).exp();
         let [mean, rest] = self.means.get_or_insert([reading, 0.0]);
         let once = reading - *mean;
         *mean += part * once;
@@ -140,15 +131,6 @@ impl Means {
         *rest += part * twice;
         twice
     }
-}
-
-/// What turns an order back by as much as the means that were taken off turned it. They lag behind
-/// along the way: against the sense of the wheel on the way back, so that both ways would cancel.
-fn turned_back(order: usize, step_rad: f64) -> Complex<f64> {
-    let one = Complex::new(1.0, 0.0);
-    let z = Complex::from_polar(1.0, -((order + 1) as f64) * step_rad.abs());
-    let passed = (one - z) / (one - z * (1.0 - newest_part(step_rad.abs())));
-    Complex::from_polar(1.0, -step_rad.signum() * 2.0 * passed.arg())
 }
 
 /// How a wheel turns.
@@ -188,15 +170,15 @@ impl Turns {
         }
         self.step_rad = self.rate_rad_s * dt_s;
         self.angle_rad = (self.angle_rad + self.step_rad) % PERIOD_RAD;
-        self.turns += self.step_rad.abs() / TAU;
+        self.turns += self.step_rad.max(0.0) / TAU;
     }
 }
 
-/// What one wheel shows of a frame.
+/// What one wheel shows of a frame in which it turns forward.
 struct Shown {
     angle_rad: f64,
-    /// Phases of the orders that frames are often enough for.
     phases: ByOrder,
+    /// Orders for which frames come often enough.
     seen: usize,
     aside: [Complex<f64>; BESIDE.len()],
     /// What is left of the channels once their means are taken off.
@@ -204,7 +186,12 @@ struct Shown {
 }
 
 impl Shown {
-    fn new(turns: &Turns, means: &mut [Means], readings: &[Option<f64>; CHANNELS_MAX]) -> Self {
+    /// None if the wheel stands, or turns back.
+    fn new(
+        turns: &Turns,
+        means: &mut [Means],
+        readings: &[Option<f64>; CHANNELS_MAX],
+    ) -> Option<Self> {
         let angle_rad = turns.step_rad.abs();
         let mut left = [None; CHANNELS_MAX];
         for ((left, means), reading) in left.iter_mut().zip(means).zip(readings) {
@@ -212,23 +199,16 @@ impl Shown {
             let reading = reading.filter(|reading| reading.abs() < READING_MAX);
             *left = reading.map(|reading| means.taken_off(reading));
         }
-        let phase = |order: usize| {
-            let turn = Complex::from_polar(1.0, -((order + 1) as f64) * turns.angle_rad);
-            turn * turned_back(order, turns.step_rad)
-        };
         // An order that comes back within two frames is not seen.
         let seen = (0..ORDERS).filter(|order| (*order as f64 + 1.5) * angle_rad < PI);
-        let seen = if angle_rad > 0.0 { seen.count() } else { 0 };
-        Self {
+        let phase = |order: usize| -((order + 1) as f64) * turns.angle_rad;
+        (turns.step_rad > 0.0).then(|| Self {
             angle_rad,
-            phases: std::array::from_fn(|order| match order < seen {
-                true => phase(order),
-                false => Complex::default(),
-            }),
-            seen,
+            phases: std::array::from_fn(|order| Complex::from_polar(1.0, phase(order))),
+            seen: seen.count(),
             aside: BESIDE.map(|order| Complex::from_polar(1.0, -order * turns.angle_rad)),
             left,
-        }
+        })
     }
 }
 
@@ -283,7 +263,6 @@ impl Memory {
         }
     }
 
-    /// Amplitude of an order of which each unit reading says one, over that of noise.
     fn gain(&self) -> f64 {
         over(self.length, self.square.sqrt())
     }
@@ -327,6 +306,7 @@ impl OrderTracker {
             wheel: turns.wheel,
             memory_turns,
             turns: 0.0,
+            gain: 0.0,
             amplitudes: vec![Complex::default(); ORDERS * channels],
             beside: vec![None; ORDERS * channels],
             shared: rates
@@ -361,7 +341,9 @@ impl OrderTracker {
             turns.turn(dt_s, readings);
         }
         for (own, wheel) in self.wheels.iter_mut().enumerate() {
-            let shown = Shown::new(&self.turns[own], &mut wheel.means, readings);
+            let Some(shown) = Shown::new(&self.turns[own], &mut wheel.means, readings) else {
+                continue;
+            };
             for memory in &mut wheel.memories {
                 memory.take(own, &self.turns, &shown);
             }
@@ -379,7 +361,7 @@ impl OrderTracker {
         for (i, found) in self.found.iter_mut().enumerate() {
             let (own, of) = (i / MEMORIES_TURNS.len(), i % MEMORIES_TURNS.len());
             let memory = &self.wheels[own].memories[of];
-            found.turns = self.turns[own].turns;
+            (found.turns, found.gain) = (self.turns[own].turns, memory.gain());
             let places = found.amplitudes.iter_mut().zip(&mut found.beside);
             for ((amplitude, beside), sums) in places.zip(&memory.sums) {
                 let is_seen = sums.square > SEEN * memory.square;

@@ -1,7 +1,8 @@
 //! What labelled runs showed of a fault that comes back with each turn of a wheel.
 //!
 //! In standardized amplitudes `y`, complex and of unit variance without the fault, it shows as
-//! `q a e^{-ihφ}`, with a learned `a`. The phase `φ` is that of the wheel when the record began,
+//! `q a e^{-ihφ}`, with a learned `a` times the gain of the frames that are remembered. Noise of the
+//! channels is taken for independent. The phase `φ` is that of the wheel when the record began,
 //! which nobody knows, and the size `q` is that of this time. The log-likelihood ratio is that of
 //! two Gaussian laws, `2q Re Σ (a e^{-ihφ})* y - q² Σ |a|²`, averaged over both.
 //!
@@ -40,9 +41,9 @@ pub struct WheelNoise {
     pub wheel: String,
     /// Mean square beside each order, order by order within each channel.
     pub squares: Vec<f64>,
-    /// Mean square at each order over that beside it, with the shortest memory, likewise: 1 of a
-    /// wheel that is round, more of one that is not.
-    pub excess: Vec<f64>,
+    /// By how much the mean square at each order exceeds that beside it, over that and the squared
+    /// gain, likewise: 0 of a wheel that is round, more of one that is not.
+    pub ripple: Vec<f64>,
 }
 
 impl WheelNoise {
@@ -52,9 +53,8 @@ impl WheelNoise {
         let usual = NOISE_WEIGHT * self.squares[place];
         let square = (usual + LOOKS * orders.beside[place]?) / (NOISE_WEIGHT + LOOKS);
         // What comes back without a fault grows with the turns as a fault does.
-        let comes_back = (self.excess[place] - 1.0) * orders.growth().powi(2);
-        let square = square * (1.0 + comes_back);
-        Some(square.clamp(SQUARE[0], SQUARE[1]).sqrt())
+        let square = square * (1.0 + self.ripple[place] * orders.gain.powi(2));
+        Some(square.max(SQUARE[0]).sqrt())
     }
 }
 
@@ -66,7 +66,8 @@ pub struct TurningSignature {
     pub fault: String,
     /// Runs that it was learned from.
     pub runs: usize,
-    /// Real parts of the standardized amplitudes, order by order within each channel.
+    /// Real parts of the standardized amplitudes over their gain, order by order within each
+    /// channel.
     pub real: Vec<f64>,
     /// The imaginary parts.
     pub imaginary: Vec<f64>,
@@ -89,14 +90,14 @@ struct Sought {
     along: ByOrder,
     /// Square of these.
     square: f64,
-    /// How much larger amplitudes are than they were learned.
-    growth: f64,
+    /// By how much amplitudes exceed those that were learned.
+    gain: f64,
 }
 
 impl Sought {
     fn log_ratios(&self) -> [f64; PHASES * SIZES.len()] {
         std::array::from_fn(|i| {
-            let (size, phase) = (self.growth * SIZES[i / PHASES], (i % PHASES) as f64);
+            let (size, phase) = (self.gain * SIZES[i / PHASES], (i % PHASES) as f64);
             2.0 * size * turned(&self.along, phase / PHASES as f64) - size * size * self.square
         })
     }
@@ -138,16 +139,17 @@ impl TurningFault {
     /// memories that are filled. None if none is.
     #[must_use]
     pub fn log_ratio(&self, orders: &[WheelOrders]) -> Option<f64> {
-        self.mean_log_ratio(orders, |_| None)
+        self.mean_log_ratio(orders, |_| Some(None))
     }
 
-    /// The same by what `other`, a fault of another wheel, does not explain.
+    /// The same by what `other`, a fault of another wheel, does not explain; by the memories that
+    /// are filled for both wheels.
     #[must_use]
     pub fn log_ratio_beside(&self, other: &Self, orders: &[WheelOrders]) -> Option<f64> {
         self.mean_log_ratio(orders, |own| {
             let mut of_other = other.told(orders);
             let of_other = of_other.find(|one| one.memory_turns == own.memory_turns)?;
-            other.explained(of_other)
+            Some(other.explained(of_other))
         })
     }
 
@@ -160,12 +162,15 @@ impl TurningFault {
     fn mean_log_ratio<'a>(
         &self,
         orders: &'a [WheelOrders],
-        beside: impl Fn(&'a WheelOrders) -> Option<Explained<'a>>,
+        beside: impl Fn(&'a WheelOrders) -> Option<Option<Explained<'a>>>,
     ) -> Option<f64> {
         let mut ratios = [f64::NEG_INFINITY; MEMORIES_TURNS.len()];
         let mut count = 0.0;
-        for (ratio, orders) in ratios.iter_mut().zip(self.told(orders)) {
-            let all = self.sought(orders, beside(orders).as_ref()).log_ratios();
+        let seen = self
+            .told(orders)
+            .filter_map(|own| Some((own, beside(own)?)));
+        for (ratio, (orders, explained)) in ratios.iter_mut().zip(seen) {
+            let all = self.sought(orders, explained.as_ref()).log_ratios();
             *ratio = log_sum_exp(&all) - (all.len() as f64).ln();
             count += 1.0;
         }
@@ -182,7 +187,7 @@ impl TurningFault {
         let mut sought = Sought {
             along: ByOrder::default(),
             square: 0.0,
-            growth: orders.growth(),
+            gain: orders.gain,
         };
         for place in 0..self.signature.real.len() {
             let Some(deviation) = self.noise.deviation(orders, place) else {
@@ -254,10 +259,8 @@ impl TurningSignatures {
         let n = ORDERS * channels;
         let is_noise = |noise: &WheelNoise| {
             let is_square = |value: &f64| (0.0..=SQUARE[1]).contains(value);
-            let is_excess = |value: &f64| (1.0..=SQUARE[1]).contains(value);
-            (noise.squares.len(), noise.excess.len()) == (n, n)
-                && noise.squares.iter().all(is_square)
-                && noise.excess.iter().all(is_excess)
+            (noise.squares.len(), noise.ripple.len()) == (n, n)
+                && noise.squares.iter().chain(&noise.ripple).all(is_square)
         };
         let is_whole = |one: &TurningSignature| {
             let mut numbers = one.real.iter().chain(&one.imaginary);

@@ -12,10 +12,9 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::Serialize;
 use vigil_robot::Description;
 use vigil_robot::channel_model::context_change::{
-    AGES, ChangeAge, ContextChange, ContextChanges, DIRECTIONS_MAX, Step, StepChannels,
-    StepDirection, Steps, WAIT_S, steps,
+    AGES, ChangeAge, ContextChange, DIRECTIONS_MAX, Step, StepChannels, StepDirection, Steps,
+    WAIT_S, steps,
 };
-use vigil_robot::channel_model::law::BLOCK_S;
 use vigil_robot::channel_model::{Model, Scales};
 
 use super::recognition::{FOUND, FOUND_RATIO, found_unseen};
@@ -29,6 +28,8 @@ pub const TOLD_S: f64 = 1.0;
 const AROUND_S: [f64; 2] = [1.0, 10.0];
 /// Part of a covariance that is taken for independent.
 const INDEPENDENT: f64 = 0.1;
+/// Smallest variance of a step: of a channel that never varies.
+const VARIANCE_MIN: f64 = 1e-6;
 /// So often a change may be told where none is, 1/h, where a log is long enough to show it. Chosen.
 const FALSE_1_H: f64 = 3.0;
 
@@ -58,6 +59,20 @@ pub struct ContextFit {
     pub runs_told: usize,
     /// True if the model tells the change.
     pub is_used: bool,
+}
+
+impl ContextFit {
+    /// Of a log that is too short to tell what is usual.
+    fn of_no_run(context: &str, runs: usize) -> Self {
+        Self {
+            context: context.to_owned(),
+            runs,
+            runs_with_step: 0,
+            groups: 0,
+            runs_told: 0,
+            is_used: false,
+        }
+    }
 }
 
 impl fmt::Display for ContextFit {
@@ -93,6 +108,8 @@ struct Moment {
 /// A run, or the part of one that one model has not seen.
 struct Stretch {
     record: usize,
+    /// Length of a block, s.
+    block_s: f64,
     moments: Vec<Moment>,
 }
 
@@ -146,14 +163,15 @@ pub(super) fn fit(
             context.shows.is_empty() || context.shows.contains(name)
         });
         let (shown, used) = (shown.collect(), (stretches.as_slice(), all.as_slice()));
-        let Some(health) = Health::new(used, shown, channels) else {
-            continue;
-        };
         let labels = all.iter().filter(|one| one.label.context == context.name);
         let labels: Vec<&Labelled<'_>> = labels.collect();
         if labels.is_empty() {
             continue;
         }
+        let Some(health) = Health::new(used, shown, channels) else {
+            told.push(ContextFit::of_no_run(&context.name, labels.len()));
+            continue;
+        };
         let seen: Vec<&Labelled<'_>> = labels
             .iter()
             .copied()
@@ -172,9 +190,6 @@ pub(super) fn fit(
             is_used: change.is_some(),
         });
         model.contexts.change.extend(change);
-    }
-    if model.contexts.is_empty() {
-        model.contexts = ContextChanges::default();
     }
     told
 }
@@ -198,6 +213,7 @@ fn stretches(
         if part.replace((sight.record, fold)) != Some((sight.record, fold)) {
             out.push(Stretch {
                 record: sight.record,
+                block_s: sight.window.block_s(),
                 moments: Vec::new(),
             });
         }
@@ -215,6 +231,8 @@ fn stretches(
 
 /// All runs, and what steps they show where nothing changes.
 struct Health<'a> {
+    /// Length of a block, s.
+    block_s: f64,
     channels: usize,
     /// The channels in which it shows.
     shown: Vec<usize>,
@@ -237,6 +255,7 @@ impl<'a> Health<'a> {
     ) -> Option<Self> {
         let n = shown.len();
         let mut health = Self {
+            block_s: stretches.first()?.block_s,
             channels,
             shown,
             stretches,
@@ -261,7 +280,10 @@ impl<'a> Health<'a> {
             }
             covariance /= f64::from(count as u32);
             let diagonal = DMatrix::from_diagonal(&covariance.diagonal());
-            let shrunk = (1.0 - INDEPENDENT) * covariance + INDEPENDENT * diagonal;
+            let mut shrunk = (1.0 - INDEPENDENT) * covariance + INDEPENDENT * diagonal;
+            for i in 0..n {
+                shrunk[(i, i)] = shrunk[(i, i)].max(VARIANCE_MIN);
+            }
             health.roots.push(shrunk.cholesky()?.l());
         }
         Some(health)
@@ -285,9 +307,9 @@ impl<'a> Health<'a> {
 
     /// The steps that a labelled change leaves at an age.
     fn steps_at(&self, one: &Labelled<'_>, age: usize) -> Vec<DVector<f64>> {
-        let at_s = one.label.onset_s + (age + 1) as f64 * BLOCK_S;
+        let at_s = one.label.onset_s + (age + 1) as f64 * self.block_s;
         let moments = self.stretches_of(one).flat_map(|stretch| &stretch.moments);
-        let near = moments.filter(|moment| (moment.t_s - at_s).abs() <= 0.5 * BLOCK_S);
+        let near = moments.filter(|moment| (moment.t_s - at_s).abs() <= 0.5 * self.block_s);
         let steps = near.filter_map(|moment| moment.steps[age].as_ref());
         steps.map(|step| vector(step, &self.shown)).collect()
     }
@@ -388,11 +410,15 @@ impl<'a> Health<'a> {
     /// True if the first change that is told of a run is the labelled one.
     fn is_told(&self, change: &ContextChange, one: &Labelled<'_>) -> bool {
         let moments = self.stretches_of(one).flat_map(|stretch| &stretch.moments);
-        let mut events = moments.filter_map(|moment| {
+        let events = moments.filter_map(|moment| {
             let (ratio, age) = change.log_ratio(&moment.steps)?;
-            (ratio > change.threshold).then_some(moment.t_s - age as f64 * BLOCK_S)
+            let came_s = moment.t_s - age as f64 * self.block_s;
+            let counts = came_s >= one.label.onset_s - AROUND_S[1];
+            (ratio > change.threshold && counts).then_some((moment.t_s, came_s))
         });
-        let first = events.find(|t_s| *t_s >= one.label.onset_s - AROUND_S[1]);
+        let first = events
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, came_s)| came_s);
         first.is_some_and(|t_s| (t_s - one.label.onset_s).abs() <= TOLD_S)
     }
 }

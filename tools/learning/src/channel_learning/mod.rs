@@ -250,9 +250,9 @@ fn fit_declared(
     let used = (robot, scales, log.until_s);
     let mut told = labelled::fit(model, (models, records), labelled, used);
     told.extend(turning::fit(model, records, labelled, (robot, log.until_s)));
-    for part in models {
+    for (fold, part) in models.iter_mut().enumerate() {
         part.signatures.clone_from(&model.signatures);
-        part.turning.clone_from(&model.turning);
+        part.turning = turning::without(&model.turning, (records, fold), robot);
     }
     told
 }

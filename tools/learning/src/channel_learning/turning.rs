@@ -47,8 +47,8 @@ struct Sight<'a> {
     dt_s: f64,
     /// How far the wheel has turned since the last sight, turns.
     turns: f64,
-    /// How much larger the fault's amplitude is than after many turns.
-    growth: f64,
+    /// By how much the fault's amplitude exceeds that in a single frame.
+    gain: f64,
     /// True if a new record begins.
     begins: bool,
     /// With the memory that is learned from.
@@ -155,11 +155,32 @@ pub(super) fn fit(
     told
 }
 
+/// The signatures with the noise of the log without one of its parts.
+pub(super) fn without(
+    all: &TurningSignatures,
+    (records, part): (&[Record], usize),
+    robot: &Description,
+) -> TurningSignatures {
+    let mut all = all.clone();
+    for known in &mut all.wheel {
+        let wheel = robot.wheel_index(&known.wheel);
+        let found = wheel.and_then(|wheel| noise(records, wheel, &known.wheel, Some(part)));
+        if let Some(found) = found {
+            *known = found;
+        }
+    }
+    all
+}
+
 /// What a run shows after its onset, cut into thirds: each as if it were a run of its own.
 fn thirds(label: &LabelledRun<'_>, until_s: f64, robot: &Description) -> Vec<SeenRun> {
-    let is_shown = |frame: &&SensorFrame| {
-        let t_s = frame.header.t_capture_ns as f64 * 1e-9;
-        (label.onset_s..=until_s).contains(&t_s)
+    let time_s = |frame: &SensorFrame| frame.header.t_capture_ns as f64 * 1e-9;
+    let warm_s = label.run.frames.first().map_or(0.0, time_s) + robot.warm_up_s;
+    let is_shown =
+        |frame: &&SensorFrame| (label.onset_s.max(warm_s)..=until_s).contains(&time_s(frame));
+    let warm = Description {
+        warm_up_s: 0.0,
+        ..robot.clone()
     };
     let frames = label.run.frames.iter().filter(is_shown).copied();
     let frames: Vec<SensorFrame> = frames.collect();
@@ -172,7 +193,7 @@ fn thirds(label: &LabelledRun<'_>, until_s: f64, robot: &Description) -> Vec<See
         SeenRun {
             group: format!("third {third}"),
             onset_s: 0.0,
-            records: record::all(&[&run], until_s, robot),
+            records: record::all(&[&run], until_s, &warm),
         }
     };
     frames.chunks(length).enumerate().map(third).collect()
@@ -216,7 +237,7 @@ fn sights(record: &Record, wheel: usize) -> Vec<(f64, Sight<'_>)> {
         let sight = Sight {
             dt_s: now.dt_s,
             turns,
-            growth: orders.growth(),
+            gain: orders.gain,
             begins,
             orders,
             all,
@@ -228,11 +249,11 @@ fn sights(record: &Record, wheel: usize) -> Vec<(f64, Sight<'_>)> {
 
 /// The sights of a run that show its fault long enough to say something.
 fn after_onset(record: &Record, wheel: usize, onset_s: f64) -> Vec<Sight<'_>> {
-    let mut began_at = 0.0;
+    let (mut began_at, mut begins) = (0.0, false);
     let mut out = Vec::new();
     for (t_s, mut sight) in sights(record, wheel) {
         if sight.begins {
-            began_at = 0.0;
+            (began_at, begins) = (0.0, true);
         }
         if t_s < onset_s {
             began_at = sight.orders.turns;
@@ -240,7 +261,8 @@ fn after_onset(record: &Record, wheel: usize, onset_s: f64) -> Vec<Sight<'_>> {
         }
         let turns = sight.orders.turns - began_at;
         if turns >= 0.5 * TURNS {
-            sight.growth = sight.orders.growth_since(turns);
+            sight.gain = sight.orders.gain_since(turns);
+            sight.begins = std::mem::take(&mut begins);
             out.push(sight);
         }
     }
@@ -249,6 +271,7 @@ fn after_onset(record: &Record, wheel: usize, onset_s: f64) -> Vec<Sight<'_>> {
 
 /// What a wheel shows in the log; none if it never turns far enough.
 fn health<'a>(records: &'a [Record], wheel: usize, name: &str) -> Option<Health<'a>> {
+    let noise = noise(records, wheel, name, None)?;
     let run = |record: &'a Record| {
         let all = sights(record, wheel).into_iter().map(|(_, sight)| sight);
         Sample {
@@ -256,48 +279,61 @@ fn health<'a>(records: &'a [Record], wheel: usize, name: &str) -> Option<Health<
             sights: all.filter(|sight| sight.orders.is_told()).collect(),
         }
     };
-    let runs: Vec<Sample<'a>> = records.iter().map(run).collect();
-    let all = || runs.iter().flat_map(|run| &run.sights);
+    Some(Health {
+        wheel,
+        noise,
+        runs: records.iter().map(run).collect(),
+    })
+}
+
+/// The noise of a wheel in the log but for the part `left_out`; none if it never turns far enough.
+fn noise(
+    records: &[Record],
+    wheel: usize,
+    name: &str,
+    left_out: Option<usize>,
+) -> Option<WheelNoise> {
+    let mut all = Vec::new();
+    for record in records {
+        let is_used = |(_, fold): &(&Sight<'_>, &usize)| Some(**fold) != left_out;
+        let found = sights(record, wheel);
+        let found: Vec<Sight<'_>> = found.into_iter().map(|(_, sight)| sight).collect();
+        let used = found.iter().zip(&record.folds).filter(is_used);
+        let told = used.filter(|(sight, _)| sight.orders.is_told());
+        all.extend(told.map(|(sight, _)| sight.clone()));
+    }
     // A wheel at rest shows the same again: it counts by its turns.
-    let turns: f64 = all().map(|sight| sight.turns).sum();
-    let places = all().next()?.orders.beside.len();
-    let (mut squares, mut excess) = (Vec::new(), Vec::new());
+    let turns: f64 = all.iter().map(|sight| sight.turns).sum();
+    let places = all.first()?.orders.beside.len();
+    let (mut squares, mut ripple) = (Vec::new(), Vec::new());
     for place in 0..places {
         let (mut beside, mut grown, mut at, mut weight) = (0.0, 0.0, 0.0, 0.0);
-        for sight in all() {
+        for sight in &all {
             let Some(square) = sight.orders.beside[place] else {
                 continue;
             };
             beside += sight.turns * square;
-            grown += sight.turns * square * sight.growth.powi(2);
+            grown += sight.turns * square * sight.gain.powi(2);
             at += sight.turns * sight.orders.amplitudes[place].norm_sqr();
             weight += sight.turns;
         }
         squares.push(if weight > 0.0 { beside / weight } else { 0.0 });
         // Of so few independent looks this is chance.
         let chance = ROUND_DEVIATIONS / (weight / (2.0 * TURNS)).sqrt();
-        let more = if grown > 0.0 {
-            (at - beside) / grown
-        } else {
-            0.0
-        };
-        excess.push(1.0 + (more - chance).max(0.0));
+        let more = (at - beside - chance * beside).max(0.0);
+        ripple.push(if grown > 0.0 { more / grown } else { 0.0 });
     }
-    (turns > TURNS).then(|| Health {
-        wheel,
-        noise: WheelNoise {
-            wheel: name.to_owned(),
-            squares,
-            excess,
-        },
-        runs,
+    (turns > TURNS).then(|| WheelNoise {
+        wheel: name.to_owned(),
+        squares,
+        ripple,
     })
 }
 
-/// Amplitude of a fault after many turns, standardized, from successive sights of it.
+/// Standardized amplitude of a fault over its gain, from successive sights of it.
 struct Piece {
     turns: f64,
-    /// Turns, by the square of what they show of the fault.
+    /// Turns, by the square of the gain.
     weight: f64,
     mean: Vec<Complex<f64>>,
 }
@@ -317,12 +353,12 @@ impl Health<'_> {
             let Some(last) = out.last_mut().filter(|_| sight.turns > 0.0) else {
                 continue;
             };
-            let weight = sight.turns * sight.growth.powi(2);
+            let weight = sight.turns * sight.gain.powi(2);
             last.turns += sight.turns;
             last.weight += weight;
             let part = weight / last.weight;
             for (place, mean) in last.mean.iter_mut().enumerate() {
-                let amplitude = sight.orders.amplitudes[place] / sight.growth;
+                let amplitude = sight.orders.amplitudes[place] / sight.gain;
                 let deviation = self.noise.deviation(sight.orders, place);
                 let found = deviation.map_or_else(Complex::default, |sd| amplitude / sd);
                 *mean += (found - *mean) * part;
@@ -341,7 +377,9 @@ impl Health<'_> {
         let found = pieces.iter().take(STARTS).map(of);
         let mut template = found.max_by(|a, b| square(a).total_cmp(&square(b)))?;
         // Sights within twice the memory are as good as one.
-        let noise = 1.0 / (weight / (2.0 * TURNS)).max(LOOKS_MIN);
+        let turns: f64 = pieces.iter().map(|piece| piece.turns).sum();
+        let looks = (turns / (2.0 * TURNS)).max(LOOKS_MIN);
+        let noise = turns / (weight * looks);
         for one in &mut template {
             *one *= (1.0 - noise / one.norm_sqr().max(noise)).max(0.0);
         }

@@ -203,9 +203,9 @@ fn a_step_is_the_mean_of_the_newest_blocks_less_that_of_those_before() {
         has_pose: false,
     };
     let found = steps(&window([0.0; 2], &rows), seen);
-    // Six blocks: the oldest ages have fewer than two before them, the second channel none at all.
+    // Six blocks: the oldest ages have fewer than two before them, the second channel one alone.
     let unit = |newest: f64, before: f64| 1.0 / (1.0 / newest + 1.0 / before).sqrt();
-    let second = [1.0 * unit(1.0, 5.0), 0.0, 0.0, 0.0];
+    let second = [unit(1.0, 1.0), 0.0, 0.0, 0.0];
     let means = [(3.0, 9.0 / 5.0), (4.0, 1.0), (3.0, 1.0), (11.0 / 4.0, 0.5)];
     for (age, (newer, older)) in means.into_iter().enumerate() {
         let (newest, before) = ((age + 1) as f64, (5 - age) as f64);
