@@ -97,7 +97,8 @@ pub struct Source {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// Mean of the samples since the last frame; the last one where there is none.
+    /// Mean of the samples since the last frame; the last one where there is none. Between samples
+    /// further apart than 2.5 of their usual periods nothing was measured.
     #[default]
     Mean,
     /// The last sample, up to `hold_max_s` old; `initial` before the first. For commands.
@@ -216,7 +217,7 @@ pub struct LogDescription {
     /// each match of `runs` is one.
     #[serde(default)]
     pub run_column: Option<String>,
-    /// Longest pause of a measured channel, s.
+    /// Longest pause of a measured channel, s: a longer one is refused.
     #[serde(default = "one")]
     pub gap_max_s: f64,
     /// Longest time for which a value is held, s, 30 if left out: beyond it a command is no longer

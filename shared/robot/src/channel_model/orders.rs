@@ -24,7 +24,7 @@ const FILLED: f64 = 0.5;
 /// Part of the last turns in which an order has to be seen, by squared steps.
 const SEEN: f64 = 0.5;
 /// Angle over which the mean is forgotten that is taken off a channel, twice, rad. Chosen: changes
-/// of speed are slower. The first order keeps 0.4 of its amplitude, and so does the noise beside it.
+/// of speed are slower. The first order keeps 0.4 of its amplitude, as does the noise beside it.
 const MEAN_RAD: f64 = 0.7;
 /// Where beside an order the noise is looked for.
 const BESIDE: [f64; 4] = [-0.42, -0.3, 0.3, 0.42];

@@ -1,7 +1,7 @@
 //! What labelled runs showed of a fault that comes back with each turn of a wheel.
 //!
 //! In standardized amplitudes `y`, complex and of unit variance without the fault, it shows as
-//! `q a e^{-ihφ}`, with a learned `a` times the gain of the frames that are remembered. Noise of the
+//! `q a e^{-ihφ}`, with a learned `a` and by the gain of the frames that are remembered. Noise of
 //! channels is taken for independent. The phase `φ` is that of the wheel when the record began,
 //! which nobody knows, and the size `q` is that of this time. The log-likelihood ratio is that of
 //! two Gaussian laws, `2q Re Σ (a e^{-ihφ})* y - q² Σ |a|²`, averaged over both.

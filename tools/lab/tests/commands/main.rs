@@ -8,6 +8,7 @@ mod declared_faults;
 mod import;
 mod init;
 mod model;
+mod more_robots;
 mod offline;
 mod pomdp;
 mod pomdp_compare;
