@@ -24,6 +24,31 @@ const PAUSE: Duration = Duration::from_millis(100);
 const REPEAT_NS: u64 = 5_000_000_000;
 
 /// Publishes the frames of a robot into the graph of a name, through shared memory.
+///
+/// A whole publisher; its crate depends on `vigil-blocks` and `vigil-cycle`.
+///
+/// ```no_run
+/// use std::time::Duration;
+///
+/// use vigil_blocks::SensorFrame;
+/// use vigil_cycle::{Clock, Monotonic, Publisher, clock};
+///
+/// fn main() -> Result<(), Box<dyn std::error::Error>> {
+///     let mut publisher = Publisher::join("rover")?;
+///     let mut due_ns = Monotonic.now_ns();
+///     loop {
+///         due_ns += Duration::from_millis(50).as_nanos() as u64;
+///         clock::sleep_until(due_ns);
+///         let mut frame = SensorFrame::default();
+///         let channels = publisher.channels();
+///         channels.command(&mut frame, "cmd_speed", 0.2)?;
+///         channels.command(&mut frame, "cmd_curv", 0.0)?;
+///         // And so on with what your sensors read: `vigil channels` prints the names.
+///         channels.set(&mut frame, "x", 0.1)?;
+///         publisher.publish(&frame, due_ns)?;
+///     }
+/// }
+/// ```
 pub struct Publisher {
     graph: String,
     joined: Option<Joined>,
