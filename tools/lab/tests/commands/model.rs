@@ -214,7 +214,7 @@ fn a_model_of_channels_is_shown_and_an_edited_one_refused_in_the_same_way() {
         "robot          kobuki",
         "file layout    version 5",
         "frames         kobuki.csv.gz",
-        "runs learned   1: 0",
+        "runs learned   3: 0-2",
         "of each run    the first 60 s",
         "learned range  cmd_yaw_rate -1.320 to 0.990 rad/s",
         "\nenc_L\n",

@@ -180,7 +180,7 @@ pub fn learn(log: &Log<'_>, robot: &Description) -> Result<(Model, Report), LogE
     let records = record::grouped(&learned, log.groups, until_s, robot);
     let command = excitation::ranges(&records, robot)?;
     let exposure_s = records.iter().map(Record::moving_s).sum();
-    let provenance = provenance(log, &learned, &left_out);
+    let provenance = provenance(log, robot, &learned, &left_out);
     let mut model = blank(robot, exposure_s, command, provenance);
     model.rest_s = record::rest_s(&records, lags(robot.interval_s));
     let mut report = Report::new(&model, learned.len(), left_out.len());
@@ -275,7 +275,12 @@ fn cover(
     models
 }
 
-fn provenance(log: &Log<'_>, learned: &[&Run], left_out: &[&Run]) -> Provenance {
+fn provenance(
+    log: &Log<'_>,
+    robot: &Description,
+    learned: &[&Run],
+    left_out: &[&Run],
+) -> Provenance {
     let labels = log.labelled.iter().map(|label| {
         let LabelledRun { run, onset_s, .. } = label;
         format!("{} {} {onset_s}", run.id, label.fault)
@@ -283,7 +288,9 @@ fn provenance(log: &Log<'_>, learned: &[&Run], left_out: &[&Run]) -> Provenance 
     let changes = log.changes.iter();
     let changes = changes.map(|one| format!("{} {} {}", one.run, one.context, one.onset_s));
     let labels: Vec<String> = labels.chain(changes).collect();
-    let runs = log.labelled.iter().map(|label| label.run);
+    // Those with several faults at once teach nothing.
+    let one = |label: &&LabelledRun<'_>| robot.fault.iter().any(|fault| fault.name == label.fault);
+    let runs = log.labelled.iter().filter(one).map(|label| label.run);
     let runs: Vec<&Run> = learned.iter().copied().chain(runs).collect();
     let ids: BTreeSet<u32> = runs.iter().map(|run| run.id).collect();
     Provenance {
