@@ -29,8 +29,6 @@ const DRIFT_S: f64 = 4.0;
 pub const DELAYS: [f64; 4] = [0.5, 1.0, 2.0, DELAY_BLOCKS as f64];
 /// Deviation of an erratic sensor's readings, relative to that of a whole one given all others.
 pub const ERRATIC: f64 = 6.0;
-/// Largest part of its usual size that is predicted of a channel that should read zero.
-const RESTS: f64 = 0.05;
 /// The value at which a sensor has frozen is one number more: its price in nats.
 pub const HELD: f64 = 2.0;
 /// Silence after which a channel is missing, s, if it was never silent for half as long, and how
@@ -281,14 +279,10 @@ impl Bank {
         let quantity = place.target.quantity;
         let window = &self.window;
         let (unit, predicted) = (&window.unit[channel], &window.predicted[channel]);
-        // A sensor that repeats itself is not as rough as it was; nor is one that should read zero.
+        // A sensor that repeats itself is not as rough as it was.
         let still = || {
             let newest = self.window.newest_roughness[channel];
-            let rests = predicted
-                .iter()
-                .zip(unit)
-                .all(|(predicted, unit)| predicted.abs() <= RESTS * place.usual * unit);
-            let scatter = self.laws.scatter.as_ref().filter(|_| !rests);
+            let scatter = self.laws.scatter.as_ref();
             scatter.map_or(0.0, |scatter| scatter.still(channel, newest))
         };
         let bias_sd = self.bias_sd(channel);

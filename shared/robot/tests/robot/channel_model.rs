@@ -65,10 +65,10 @@ fn a_file_that_was_changed_by_accident_is_refused() {
     );
     let edited = Model::from_toml(&edited("exposure_s = 46", "exposure_s = 946")).unwrap();
     assert!(edited.is_edited() && edited.hash() != model.hash());
-    let old = shipped().replacen("version = 4", "version = 3", 1);
+    let old = shipped().replacen("version = 5", "version = 4", 1);
     let message = Model::from_toml(&old).unwrap_err().to_string();
     assert!(
-        message.contains("layout version 3; this program reads version 4"),
+        message.contains("layout version 4; this program reads version 5"),
         "{message}"
     );
     let cut = &shipped()[..shipped().len() / 2];
