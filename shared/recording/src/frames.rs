@@ -18,14 +18,11 @@ use vigil_blocks::{COMMANDS, SensorFrame};
 use vigil_robot::channel::{Role, channels};
 use vigil_robot::{ChannelMap, Description};
 
+use crate::table::Table;
 pub use crate::table::TableError as FramesError;
-use crate::table::{Table, wrong_row};
 
-/// A gap longer than this many median intervals of its run is refused. Chosen by hand: above any
-/// jitter of a recorder, below the loss of a second at 10 Hz.
-const GAP_INTERVALS_MAX: f64 = 10.0;
-/// A gap longer than this is refused whatever the median, s: after a second without frames a
-/// detector is blind, so that a run with such a gap is two.
+/// A gap longer than this is refused, s: after a second without frames a detector is blind, so that
+/// a run with such a gap is two.
 const GAP_MAX_S: f64 = 1.0;
 /// Distance between two frames that no ground robot drives, m: 2 m in less than a second. Larger
 /// ones are mostly wrong units.
@@ -197,19 +194,13 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Run>, FramesError> {
     let mut table = Table::open(path)?;
     let columns = Columns::find(&table, robot)?;
     let (mut runs, mut seen) = (Vec::<Run>::new(), BTreeSet::new());
-    let (mut row, mut first_row) = (0, 1);
     while table.advance()? {
-        row += 1;
         let (id, mut frame) = columns.frame(&table)?;
         if runs.last().is_none_or(|run| run.id != id) {
             if !seen.insert(id) {
                 let message = format!("run {id} appears again: the rows of a run are contiguous");
                 return Err(table.wrong(message));
             }
-            if let Some(whole) = runs.last() {
-                even(path, whole, first_row)?;
-            }
-            first_row = row;
             runs.push(Run {
                 id,
                 frames: Vec::new(),
@@ -220,29 +211,10 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Run>, FramesError> {
         frame.header.seq = run.frames.len() as u64;
         run.frames.push(frame);
     }
-    let Some(whole) = runs.last() else {
+    if runs.is_empty() {
         return Err(table.wrong("there are no frames".into()));
-    };
-    even(path, whole, first_row)?;
+    }
     Ok(runs)
-}
-
-/// Refuses a run with a gap of many times its median interval. `first_row`: row of its first frame.
-fn even(path: &Path, run: &Run, first_row: u64) -> Result<(), FramesError> {
-    let intervals_ns = intervals_ns(run);
-    let Some(usual_s) = median_s(&mut intervals_ns.clone()) else {
-        return Ok(());
-    };
-    let gap = intervals_ns.iter().zip(first_row + 1..);
-    let mut gaps = gap.map(|(&gap_ns, row)| (gap_ns as f64 * 1e-9, row));
-    let Some((gap_s, row)) = gaps.find(|(gap_s, _)| *gap_s > GAP_INTERVALS_MAX * usual_s) else {
-        return Ok(());
-    };
-    let gap = format!(
-        "run {}: a gap of {gap_s:.3} s, usual are {usual_s:.3} s",
-        run.id
-    );
-    Err(wrong_row(path, row, format!("{gap}: start a new run")))
 }
 
 /// Time between consecutive frames, ns.
