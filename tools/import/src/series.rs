@@ -108,9 +108,7 @@ pub(super) fn tables(
                 let factor = source.time.unit.factor();
                 let theirs = table.column(column)?.iter().map(|value| value * factor);
                 let apart = table.time_s.iter().zip(theirs).map(|(a, b)| a - b);
-                let mut apart: Vec<f64> = apart.filter(|apart| apart.is_finite()).collect();
-                apart.sort_by(f64::total_cmp);
-                apart.get(apart.len() / 2).copied()
+                median(apart.filter(|apart| apart.is_finite()).collect())
             })
             .unwrap_or(0.0);
         if let Some(table) = tables.get_mut(i) {
@@ -352,13 +350,8 @@ impl Series {
 
     /// Median time between two samples, s; 0 of fewer.
     pub fn period_s(&self) -> f64 {
-        let mut apart: Vec<f64> = self
-            .time_s
-            .windows(2)
-            .map(|pair| pair[1] - pair[0])
-            .collect();
-        apart.sort_by(f64::total_cmp);
-        apart.get(apart.len() / 2).copied().unwrap_or(0.0)
+        let apart = self.time_s.windows(2).map(|pair| pair[1] - pair[0]);
+        median(apart.collect()).unwrap_or(0.0)
     }
 
     /// The value on the line between the samples around `t_s`.
@@ -371,6 +364,12 @@ impl Series {
         let (t1, v1) = (*self.time_s.get(before + 1)?, *self.value.get(before + 1)?);
         Some(v0 + (v1 - v0) * (t_s - t0) / (t1 - t0))
     }
+}
+
+/// The middle value, of two the larger; none of none.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
 }
 
 /// An angle in ±pi.

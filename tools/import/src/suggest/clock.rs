@@ -1,5 +1,6 @@
 //! Which column of a table is its time, and in which unit.
 
+use crate::series::median;
 use crate::survey::{SurveyTable, Values};
 
 /// Units with their size, s, and the step in them that a clock since 1970 passes: the year 2001.
@@ -138,12 +139,6 @@ fn unit(column: &Values) -> Option<(&'static str, f64, bool)> {
     fitting
         .next()
         .map(|(unit, factor, _)| (*unit, *factor, false))
-}
-
-/// The middle value; none of none.
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 #[cfg(test)]
