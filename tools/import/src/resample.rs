@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
+use vigil_robot::Description;
+
 use super::ImportError;
 use super::description::{ChannelSource, LogDescription, Method};
 use super::series::{Series, wrapped};
-use vigil_robot::Description;
 
 /// Shortest run, s.
 const RUN_MIN_S: f64 = 1.0;
@@ -65,14 +66,14 @@ impl Grid {
             .collect();
         for (channel, series) in log.in_order(columns).zip(series) {
             self.check(log, channel, series)?;
-            let is_told = channel.method == Method::Hold;
+            let is_command = channel.method == Method::Hold;
             let period_s = series.period_s();
             for (i, row) in rows.iter_mut().enumerate() {
                 let t_s = self.start_s + i as f64 * self.period_s;
                 let value = self.value(channel, series, t_s);
                 let value = if channel.angle { wrapped(value) } else { value };
-                let pauses = !is_told && self.is_pause(series, period_s, t_s);
-                is_measured[i] |= !is_told && !pauses;
+                let pauses = !is_command && self.is_pause(series, period_s, t_s);
+                is_measured[i] |= !is_command && !pauses;
                 let is_lost = pauses && !robot.has_fault_models();
                 row.push(if is_lost { f64::NAN } else { value });
             }
