@@ -24,8 +24,6 @@ struct Declared {
     /// How it came back in them with the turns of a wheel.
     turning: Option<TurningFault>,
     evidence: Evidence,
-    /// The same by what the likeliest fault of another wheel does not explain.
-    further: Evidence,
 }
 
 /// How labelled runs taught that a fault comes back with the turns of its wheel.
@@ -74,6 +72,8 @@ pub struct FaultPair {
 #[derive(Debug, Clone)]
 pub struct DeclaredFaults {
     all: Vec<Declared>,
+    /// Evidence of each by what the likeliest fault of another wheel does not explain.
+    further: Vec<Evidence>,
     signatures: Signatures,
     channels: usize,
 }
@@ -102,11 +102,11 @@ impl DeclaredFaults {
                 signature: learned.find(|one| one.fault == fault.name).cloned(),
                 turning: taught.and_then(|taught| turning(robot, fault, taught.turning)),
                 evidence: Evidence::default(),
-                further: Evidence::default(),
             }
         });
         Self {
             all: declared.collect(),
+            further: vec![Evidence::default(); robot.fault.len()],
             signatures,
             channels: used.len(),
         }
@@ -141,8 +141,9 @@ impl DeclaredFaults {
     /// Forgets the run.
     pub fn reset(&mut self) {
         for declared in &mut self.all {
-            (declared.evidence, declared.further) = Default::default();
+            declared.evidence = Evidence::default();
         }
+        self.further.fill(Evidence::default());
     }
 
     /// Takes what the last turns of the wheels say; the last ones were those of `dt_s` ago.
@@ -153,21 +154,19 @@ impl DeclaredFaults {
                 declared.evidence.take(log_ratio, dt_s);
             }
         }
-        let Some(first) = self.likeliest() else {
+        let first = self.likeliest().and_then(|i| self.all[i].turning.as_ref());
+        let Some(first) = first else {
             return;
         };
-        for second in 0..self.all.len() {
-            if let Some(log_ratio) = self.log_ratio_beside(first, second, orders) {
-                self.all[second].further.take(log_ratio, dt_s);
+        let explained = first.explained(orders);
+        for (second, further) in self.all.iter().zip(&mut self.further) {
+            let second = second.turning.as_ref();
+            let other = second.filter(|other| other.wheel != first.wheel);
+            let found = other.and_then(|other| other.log_ratio_beside(&explained, orders));
+            if let Some(log_ratio) = found {
+                further.take(log_ratio, dt_s);
             }
         }
-    }
-
-    fn log_ratio_beside(&self, first: usize, second: usize, orders: &[WheelOrders]) -> Option<f64> {
-        let [first, second] = [first, second].map(|fault| self.all[fault].turning.as_ref());
-        let (first, second) = (first?, second?);
-        let is_of_another = first.wheel != second.wheel;
-        is_of_another.then(|| second.log_ratio_beside(first, orders))?
     }
 
     /// The fault that comes back with the turns of a wheel for which most speaks; none if nothing
@@ -223,14 +222,13 @@ impl DeclaredFaults {
         let wheel = |i: usize| self.all[i].turning.as_ref().map(|turning| turning.wheel);
         let is_other = |&i: &usize| wheel(i).is_some() && wheel(i) != wheel(first);
         let others = (0..self.all.len()).filter(is_other);
-        let further = |i: usize| self.all[i].further;
-        let unbounded = |i: &usize| further(*i).unbounded();
+        let unbounded = |i: &usize| self.further[*i].unbounded();
         let second = others.max_by(|a, b| unbounded(a).total_cmp(&unbounded(b)))?;
-        let log_ratio = further(second).log_ratio();
+        let log_ratio = self.further[second].log_ratio();
         (log_ratio > 0.0).then(|| FaultPair {
             faults: [first, second],
             further: log_ratio,
-            beyond_bound: self.beyond_bound(first) + further(second).beyond_bound(),
+            beyond_bound: self.beyond_bound(first) + self.further[second].beyond_bound(),
         })
     }
 

@@ -268,7 +268,8 @@ impl Memory {
     }
 }
 
-fn over(numerator: f64, denominator: f64) -> f64 {
+/// The quotient; 0 if the denominator is 0.
+pub(super) fn over(numerator: f64, denominator: f64) -> f64 {
     if denominator > 0.0 {
         numerator / denominator
     } else {

@@ -15,7 +15,7 @@ use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use vigil_inference::logspace::log_sum_exp;
 
-use super::orders::{ByOrder, MEMORIES_TURNS, ORDERS, WheelOrders};
+use super::orders::{ByOrder, MEMORIES_TURNS, ORDERS, WheelOrders, over};
 use crate::fault_table::DECLARED_MAX;
 
 /// Phases of a wheel that are tried, and steps between two of them where one phase is to be found.
@@ -95,31 +95,34 @@ struct Sought {
 }
 
 impl Sought {
-    fn log_ratios(&self) -> [f64; PHASES * SIZES.len()] {
-        std::array::from_fn(|i| {
+    fn log_ratio(&self) -> f64 {
+        let ratios: [f64; PHASES * SIZES.len()] = std::array::from_fn(|i| {
             let (size, phase) = (self.gain * SIZES[i / PHASES], (i % PHASES) as f64);
             2.0 * size * turned(&self.along, phase / PHASES as f64) - size * size * self.square
-        })
+        });
+        log_mean(&ratios)
     }
 
     /// The phase that explains most, in turns, behind the sum along it.
-    fn likeliest_of(&self, phases: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    fn likeliest_of(&self, phases: impl Iterator<Item = f64>) -> (f64, f64) {
         let found = phases.map(|phase| (turned(&self.along, phase), phase));
-        found.max_by(|a, b| a.0.total_cmp(&b.0))
+        found.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
     }
 
-    /// Size and phase, in turns, that explain most; none if any size explains less than none does.
-    fn likeliest(&self) -> Option<(f64, f64)> {
+    /// Size and phase, in turns, that explain most; of size 0 if any other explains less.
+    fn likeliest(&self) -> (f64, f64) {
         let step = 1.0 / PHASES as f64;
-        let (_, coarse) = self.likeliest_of((0..PHASES).map(|i| i as f64 * step))?;
+        let (_, coarse) = self.likeliest_of((0..PHASES).map(|i| i as f64 * step));
         let finer = |i: usize| coarse + step * (i as f64 / FINER as f64 - 1.0);
-        let (along, phase) = self.likeliest_of((0..=2 * FINER).map(finer))?;
-        (along > 0.0 && self.square > 0.0).then(|| (along / self.square, phase))
+        let (along, phase) = self.likeliest_of((0..=2 * FINER).map(finer));
+        (over(along.max(0.0), self.square), phase)
     }
 }
 
-/// Amplitudes in the units of the channels.
-struct Explained<'a> {
+type ByMemory<T> = [Option<T>; MEMORIES_TURNS.len()];
+
+/// Amplitudes that a fault explains, in the units of the channels.
+pub(super) struct Explained<'a> {
     fault: &'a TurningFault,
     orders: &'a WheelOrders,
     /// Size and phase of each order.
@@ -134,23 +137,44 @@ impl Explained<'_> {
     }
 }
 
+/// Logarithm of a mean, from logarithms.
+fn log_mean(logarithms: &[f64]) -> f64 {
+    log_sum_exp(logarithms) - (logarithms.len() as f64).ln()
+}
+
+/// Mean over the memories; none of none.
+fn over_memories(found: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut ratios, mut count) = ([0.0; MEMORIES_TURNS.len()], 0);
+    for (ratio, found) in ratios.iter_mut().zip(found) {
+        (*ratio, count) = (found, count + 1);
+    }
+    (count > 0).then(|| log_mean(&ratios[..count]))
+}
+
 impl TurningFault {
     /// Log-likelihood ratio of the fault to health, by what its wheel shows: the mean over the
     /// memories that are filled. None if none is.
     #[must_use]
     pub fn log_ratio(&self, orders: &[WheelOrders]) -> Option<f64> {
-        self.mean_log_ratio(orders, |_| Some(None))
+        let alone = |own| self.sought(own, |_| Complex::default()).log_ratio();
+        over_memories(self.told(orders).map(alone))
     }
 
-    /// The same by what `other`, a fault of another wheel, does not explain; by the memories that
-    /// are filled for both wheels.
-    #[must_use]
-    pub fn log_ratio_beside(&self, other: &Self, orders: &[WheelOrders]) -> Option<f64> {
-        self.mean_log_ratio(orders, |own| {
-            let mut of_other = other.told(orders);
-            let of_other = of_other.find(|one| one.memory_turns == own.memory_turns)?;
-            Some(other.explained(of_other))
-        })
+    /// The same by what a fault of another wheel does not explain; by the memories that are filled
+    /// for both wheels.
+    pub(super) fn log_ratio_beside(
+        &self,
+        other: &ByMemory<Explained<'_>>,
+        orders: &[WheelOrders],
+    ) -> Option<f64> {
+        let beside = |own: &WheelOrders| {
+            let mut other = other.iter().flatten();
+            let other = other.find(|one| one.orders.memory_turns == own.memory_turns)?;
+            let shared = own.shared_with(other.fault.wheel);
+            let explained = |place: usize| shared[place % ORDERS] * other.amplitude(place);
+            Some(self.sought(own, explained).log_ratio())
+        };
+        over_memories(self.told(orders).filter_map(beside))
     }
 
     fn told<'a>(&self, orders: &'a [WheelOrders]) -> impl Iterator<Item = &'a WheelOrders> {
@@ -159,31 +183,12 @@ impl TurningFault {
         own.filter(|one| one.is_told())
     }
 
-    fn mean_log_ratio<'a>(
-        &self,
-        orders: &'a [WheelOrders],
-        beside: impl Fn(&'a WheelOrders) -> Option<Option<Explained<'a>>>,
-    ) -> Option<f64> {
-        let mut ratios = [f64::NEG_INFINITY; MEMORIES_TURNS.len()];
-        let mut count = 0.0;
-        let seen = self
-            .told(orders)
-            .filter_map(|own| Some((own, beside(own)?)));
-        for (ratio, (orders, explained)) in ratios.iter_mut().zip(seen) {
-            let all = self.sought(orders, explained.as_ref()).log_ratios();
-            *ratio = log_sum_exp(&all) - (all.len() as f64).ln();
-            count += 1.0;
-        }
-        (count > 0.0).then(|| log_sum_exp(&ratios) - f64::ln(count))
-    }
-
     fn learned(&self, place: usize) -> Complex<f64> {
         let signature = &self.signature;
         Complex::new(signature.real[place], signature.imaginary[place])
     }
 
-    fn sought(&self, orders: &WheelOrders, beside: Option<&Explained<'_>>) -> Sought {
-        let shared = beside.map(|other| orders.shared_with(other.fault.wheel));
+    fn sought(&self, orders: &WheelOrders, explained: impl Fn(usize) -> Complex<f64>) -> Sought {
         let mut sought = Sought {
             along: ByOrder::default(),
             square: 0.0,
@@ -193,10 +198,7 @@ impl TurningFault {
             let Some(deviation) = self.noise.deviation(orders, place) else {
                 continue;
             };
-            let explained = match (beside, shared) {
-                (Some(other), Some(shared)) => shared[place % ORDERS] * other.amplitude(place),
-                _ => Complex::default(),
-            };
+            let explained = explained(place);
             let amplitude = orders.amplitudes[place] - explained;
             let unsure = deviation.hypot(UNSURE * explained.norm());
             let learned = self.learned(place) * (deviation / unsure);
@@ -206,15 +208,18 @@ impl TurningFault {
         sought
     }
 
-    /// What the likeliest size and phase of the fault explain; none if nothing does.
-    fn explained<'a>(&'a self, orders: &'a WheelOrders) -> Option<Explained<'a>> {
-        let (size, phase) = self.sought(orders, None).likeliest()?;
-        let of_order = |order: usize| Complex::from_polar(size, -TAU * (order + 1) as f64 * phase);
-        Some(Explained {
-            fault: self,
-            orders,
-            by_order: std::array::from_fn(of_order),
-        })
+    /// What the likeliest size and phase explain, by each memory that is filled.
+    pub(super) fn explained<'a>(&'a self, orders: &'a [WheelOrders]) -> ByMemory<Explained<'a>> {
+        let mut told = self.told(orders).map(|orders| {
+            let (size, phase) = self.sought(orders, |_| Complex::default()).likeliest();
+            let of_order = |h: usize| Complex::from_polar(size, -TAU * (h + 1) as f64 * phase);
+            Explained {
+                fault: self,
+                orders,
+                by_order: std::array::from_fn(of_order),
+            }
+        });
+        std::array::from_fn(|_| told.next())
     }
 }
 

@@ -157,7 +157,9 @@ fn of_first(shared: f64, second: f64) -> [WheelOrders; 2] {
 fn what_one_fault_explains_does_not_speak_for_a_second() {
     let [first, second] = [fault(0), fault(1)];
     let alone = |orders: &[WheelOrders]| second.log_ratio(orders).unwrap();
-    let beside = |orders: &[WheelOrders]| second.log_ratio_beside(&first, orders).unwrap();
+    let beside_first =
+        |orders: &[WheelOrders]| second.log_ratio_beside(&first.explained(orders), orders);
+    let beside = |orders: &[WheelOrders]| beside_first(orders).unwrap();
     let alike = of_first(1.0, 0.0);
     assert!(
         alone(&alike) > 20.0 && beside(&alike) < 0.0,
@@ -170,7 +172,7 @@ fn what_one_fault_explains_does_not_speak_for_a_second() {
     // Until both wheels have turned far enough nobody knows what the first one explains.
     let mut unfilled = of_first(1.0, 0.0);
     unfilled[0].turns = 1.0;
-    assert!(second.log_ratio_beside(&first, &unfilled).is_none());
+    assert!(beside_first(&unfilled).is_none());
     let apart = of_first(0.0, 1.0);
     assert!((alone(&apart) - beside(&apart)).abs() < 1e-12);
 }
