@@ -66,7 +66,13 @@ impl WheelOrders {
     /// True if the wheel has turned far enough to say anything.
     #[must_use]
     pub fn is_told(&self) -> bool {
-        self.turns >= FILLED * self.memory_turns
+        self.is_filled_by(self.turns)
+    }
+
+    /// True if so many turns fill enough of the memory to say anything.
+    #[must_use]
+    pub fn is_filled_by(&self, turns: f64) -> bool {
+        turns >= FILLED * self.memory_turns
     }
 
     /// The gain of what came back only in so many turns, the last ones.

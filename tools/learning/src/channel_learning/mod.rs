@@ -252,7 +252,7 @@ fn fit_declared(
     told.extend(turning::fit(model, records, labelled, (robot, log.until_s)));
     for (fold, part) in models.iter_mut().enumerate() {
         part.signatures.clone_from(&model.signatures);
-        part.turning = turning::without(&model.turning, (records, fold), robot);
+        part.turning = turning::with_unseen_noise(&model.turning, (records, fold), robot);
     }
     told
 }

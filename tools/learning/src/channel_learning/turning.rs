@@ -41,7 +41,7 @@ const THIRDS: usize = 3;
 const ROUND_DEVIATIONS: f64 = 2.0;
 
 /// What a wheel showed at the end of one observation.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 struct Sight<'a> {
     /// Length of the observation, s.
     dt_s: f64,
@@ -58,7 +58,7 @@ struct Sight<'a> {
 }
 
 /// Successive sights of a run.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 struct Sample<'a> {
     group: String,
     sights: Vec<Sight<'a>>,
@@ -156,16 +156,20 @@ pub(super) fn fit(
 }
 
 /// The signatures with the noise of the log without one of its parts.
-pub(super) fn without(
+pub(super) fn with_unseen_noise(
     all: &TurningSignatures,
     (records, part): (&[Record], usize),
     robot: &Description,
 ) -> TurningSignatures {
     let mut all = all.clone();
     for known in &mut all.wheel {
-        let wheel = robot.wheel_index(&known.wheel);
-        let found = wheel.and_then(|wheel| noise(records, wheel, &known.wheel, Some(part)));
-        if let Some(found) = found {
+        let Some(wheel) = robot.wheel_index(&known.wheel) else {
+            continue;
+        };
+        let unseen = records.iter().flat_map(|record| told(record, wheel));
+        let unseen = unseen.filter(|(_, fold)| *fold != part);
+        let unseen: Vec<Sight<'_>> = unseen.map(|(sight, _)| sight).collect();
+        if let Some(found) = noise(unseen.iter(), &known.wheel) {
             *known = found;
         }
     }
@@ -260,7 +264,7 @@ fn after_onset(record: &Record, wheel: usize, onset_s: f64) -> Vec<Sight<'_>> {
             continue;
         }
         let turns = sight.orders.turns - began_at;
-        if turns >= 0.5 * TURNS {
+        if sight.orders.is_filled_by(turns) {
             sight.gain = sight.orders.gain_since(turns);
             sight.begins = std::mem::take(&mut begins);
             out.push(sight);
@@ -269,46 +273,39 @@ fn after_onset(record: &Record, wheel: usize, onset_s: f64) -> Vec<Sight<'_>> {
     out
 }
 
+/// The sights of a wheel that has turned far enough, with the part of the log of each.
+fn told(record: &Record, wheel: usize) -> impl Iterator<Item = (Sight<'_>, usize)> {
+    let all = sights(record, wheel).into_iter().zip(&record.folds);
+    let all = all.map(|((_, sight), fold)| (sight, *fold));
+    all.filter(|(sight, _)| sight.orders.is_told())
+}
+
 /// What a wheel shows in the log; none if it never turns far enough.
 fn health<'a>(records: &'a [Record], wheel: usize, name: &str) -> Option<Health<'a>> {
-    let noise = noise(records, wheel, name, None)?;
-    let run = |record: &'a Record| {
-        let all = sights(record, wheel).into_iter().map(|(_, sight)| sight);
-        Sample {
-            group: String::new(),
-            sights: all.filter(|sight| sight.orders.is_told()).collect(),
-        }
+    let run = |record: &'a Record| Sample {
+        group: String::new(),
+        sights: told(record, wheel).map(|(sight, _)| sight).collect(),
     };
+    let runs: Vec<Sample<'a>> = records.iter().map(run).collect();
     Some(Health {
         wheel,
-        noise,
-        runs: records.iter().map(run).collect(),
+        noise: noise(runs.iter().flat_map(|run| &run.sights), name)?,
+        runs,
     })
 }
 
-/// The noise of a wheel in the log but for the part `left_out`; none if it never turns far enough.
-fn noise(
-    records: &[Record],
-    wheel: usize,
+/// The noise that a wheel shows; none if it never turns far enough.
+fn noise<'a>(
+    sights: impl Iterator<Item = &'a Sight<'a>> + Clone,
     name: &str,
-    left_out: Option<usize>,
 ) -> Option<WheelNoise> {
-    let mut all = Vec::new();
-    for record in records {
-        let is_used = |(_, fold): &(&Sight<'_>, &usize)| Some(**fold) != left_out;
-        let found = sights(record, wheel);
-        let found: Vec<Sight<'_>> = found.into_iter().map(|(_, sight)| sight).collect();
-        let used = found.iter().zip(&record.folds).filter(is_used);
-        let told = used.filter(|(sight, _)| sight.orders.is_told());
-        all.extend(told.map(|(sight, _)| sight.clone()));
-    }
     // A wheel at rest shows the same again: it counts by its turns.
-    let turns: f64 = all.iter().map(|sight| sight.turns).sum();
-    let places = all.first()?.orders.beside.len();
+    let turns: f64 = sights.clone().map(|sight| sight.turns).sum();
+    let places = sights.clone().next()?.orders.beside.len();
     let (mut squares, mut ripple) = (Vec::new(), Vec::new());
     for place in 0..places {
         let (mut beside, mut grown, mut at, mut weight) = (0.0, 0.0, 0.0, 0.0);
-        for sight in &all {
+        for sight in sights.clone() {
             let Some(square) = sight.orders.beside[place] else {
                 continue;
             };
