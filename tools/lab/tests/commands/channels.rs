@@ -2,20 +2,21 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::Value;
 use tempfile::TempDir;
 
+use super::workplace::root;
+
 const SHIPPED: &str = "config/models/kobuki.toml";
 
 fn vigil(command: &str, folder: &Path, more: &[&str]) -> Output {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut program = Command::new(env!("CARGO_BIN_EXE_vigil-lab"));
     program.args([command, "--robot", "config/robots/kobuki.toml"]);
     program.arg("--frames").arg(folder.join("frames.csv"));
-    program.args(more).current_dir(root).output().unwrap()
+    program.args(more).current_dir(root()).output().unwrap()
 }
 
 fn evaluate(folder: &Path, model: &str, more: &[&str]) -> Output {

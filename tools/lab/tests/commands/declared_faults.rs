@@ -1,25 +1,14 @@
 //! The page "Faults of your own", followed on the recordings of an aircraft; refusals of labels.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::os::unix::fs::symlink;
+use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::Value;
 use tempfile::TempDir;
 
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
-/// The commands of the page.
-fn commands() -> Vec<Vec<String>> {
-    let page = fs::read_to_string(root().join("docs/declared-faults.md")).unwrap();
-    let lines = page
-        .lines()
-        .filter(|line| line.starts_with("target/release/vigil "));
-    let words = |line: &str| line.split(' ').skip(1).map(str::to_owned).collect();
-    lines.map(words).collect()
-}
+use super::workplace::{commands, data, root, workplace};
 
 fn vigil(folder: &Path, words: &[String]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_vigil-lab"));
@@ -27,13 +16,10 @@ fn vigil(folder: &Path, words: &[String]) -> Output {
 }
 
 /// A folder with the project's configuration, the aircraft's frames and labels.
-fn workplace(data: &Path) -> TempDir {
-    let folder = TempDir::new().unwrap();
-    let link = |from: PathBuf, name: &str| {
-        std::os::unix::fs::symlink(from.canonicalize().unwrap(), folder.path().join(name)).unwrap();
-    };
-    link(root().join("config"), "config");
-    link(data.join("alfa_frames.csv.gz"), "alfa.csv.gz");
+fn flights(data: &Path) -> TempDir {
+    let folder = workplace();
+    let frames = data.join("alfa_frames.csv.gz").canonicalize().unwrap();
+    symlink(frames, folder.path().join("alfa.csv.gz")).unwrap();
     let runs = fs::read_to_string(data.join("alfa_runs.csv")).unwrap();
     let mut labels = "run,mode,onset_s,group\n".to_owned();
     for row in runs.lines().skip(1) {
@@ -52,12 +38,12 @@ fn printed(output: &Output) -> String {
 
 #[test]
 fn the_page_can_be_followed_on_an_aircrafts_flights() {
-    let Ok(data) = std::env::var("VIGIL_DATA") else {
-        eprintln!("SKIPPED: VIGIL_DATA is not set");
+    let Some(data) = data() else {
         return;
     };
-    let folder = workplace(&Path::new(&data).join("real/alfa"));
-    let commands = commands();
+    let folder = flights(&data.join("real/alfa"));
+    let page = fs::read_to_string(root().join("docs/declared-faults.md")).unwrap();
+    let commands = commands(&page);
     let names: Vec<&str> = commands.iter().map(|words| words[0].as_str()).collect();
     assert_eq!(names, ["learn", "evaluate", "learn"]);
     let learned = printed(&vigil(folder.path(), &commands[0]));

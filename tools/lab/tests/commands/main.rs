@@ -15,4 +15,5 @@ mod pomdp_compare;
 mod pomdp_learn;
 mod pomdp_solve;
 mod report;
+mod workplace;
 mod your_robot;

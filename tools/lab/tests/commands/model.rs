@@ -1,17 +1,15 @@
 //! A learned model as a user sees it, and recordings that a user should not trust.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::Value;
 use tempfile::TempDir;
 
-const MODEL: &str = "config/models/rover.toml";
+use super::workplace::root;
 
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
+const MODEL: &str = "config/models/rover.toml";
 
 fn run(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_vigil-lab"));

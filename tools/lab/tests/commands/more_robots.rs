@@ -1,40 +1,18 @@
 //! The page "More robots that ship", followed on public logs.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
-use tempfile::TempDir;
+use super::workplace::{commands, data, root, workplace_of};
 
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
-/// The commands of a section of the page, without the program.
-fn commands(section: &str) -> Vec<Vec<String>> {
+/// Unpacks a log and follows its section; the verdicts, or nothing without `VIGIL_DATA`.
+fn followed(section: &str, log: &str) -> Option<(String, String)> {
+    let folder = workplace_of(log, &data()?);
     let page = fs::read_to_string(root().join("docs/more-robots.md")).unwrap();
     let mut sections = page.split("\n## ").skip(1);
     let own = sections.find(|text| text.starts_with(section)).unwrap();
-    let lines = own.lines();
-    let lines = lines.filter_map(|line| line.strip_prefix("target/release/vigil "));
-    let words = |line: &str| line.split(' ').map(str::to_owned).collect();
-    lines.map(words).collect()
-}
-
-/// Unpacks a log and follows its section; the verdicts, or nothing without `VIGIL_DATA`.
-fn followed(section: &str, archive: &str) -> Option<(String, String)> {
-    let Ok(data) = std::env::var("VIGIL_DATA") else {
-        eprintln!("SKIPPED: VIGIL_DATA is not set");
-        return None;
-    };
-    let folder = TempDir::new().unwrap();
-    let config = root().join("config").canonicalize().unwrap();
-    std::os::unix::fs::symlink(config, folder.path().join("config")).unwrap();
-    let packed = Path::new(&data).join(format!("real/{archive}.tar.xz"));
-    let mut tar = Command::new("tar");
-    tar.arg("-xJf").arg(packed).arg("-C").arg(folder.path());
-    assert!(tar.status().unwrap().success());
-    let commands = commands(section);
+    let commands = commands(own);
     let names: Vec<&str> = commands.iter().map(|words| words[0].as_str()).collect();
     assert_eq!(names, ["import", "learn", "diagnose"]);
     let vigil = Path::new(env!("CARGO_BIN_EXE_vigil-lab")).with_file_name("vigil");

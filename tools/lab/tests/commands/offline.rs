@@ -2,20 +2,18 @@
 
 use std::fs::{self, File};
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use flate2::read::GzDecoder;
 use serde_json::Value;
 use tempfile::TempDir;
 
+use super::workplace::root;
+
 const FRAMES: &str = "tests/data/rover/learn_frames.csv.gz";
 const MODEL: &str = "config/models/rover.toml";
 const RUNS: &str = "tests/data/rover/learn_runs.csv";
-
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
 
 fn vigil(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_vigil-lab"));

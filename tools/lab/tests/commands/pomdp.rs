@@ -1,11 +1,12 @@
 //! `vigil pomdp info | track | convert` as a user runs them.
 
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use serde_json::Value;
 use tempfile::TempDir;
+
+use super::workplace::{data, root};
 
 const TIGER: &str = "discount: 0.95\nvalues: reward\nstates: left right\n\
     actions: listen open-left open-right\nobservations: hear-left hear-right\n\
@@ -16,9 +17,8 @@ const TIGER: &str = "discount: 0.95\nvalues: reward\nstates: left right\n\
     R: open-right : right : * : * -100\n";
 
 fn vigil(arguments: &[&str]) -> Output {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut command = Command::new(env!("CARGO_BIN_EXE_vigil-lab"));
-    let command = command.arg("pomdp").args(arguments).current_dir(root);
+    let command = command.arg("pomdp").args(arguments).current_dir(root());
     command.output().unwrap()
 }
 
@@ -255,8 +255,7 @@ fn what_is_wrong_is_told_with_its_place() {
 /// Beliefs of public models that were worked out elsewhere.
 #[test]
 fn public_models_are_followed_as_published() {
-    let Some(data) = std::env::var_os("VIGIL_DATA") else {
-        eprintln!("SKIPPED: VIGIL_DATA is not set; public POMDP files are not read");
+    let Some(data) = data() else {
         return;
     };
     let cases = [
@@ -281,7 +280,7 @@ fn public_models_are_followed_as_published() {
         ),
     ];
     for (name, steps, probability, belief) in cases {
-        let path = Path::new(&data).join(format!("pomdp/{name}.pomdp"));
+        let path = data.join(format!("pomdp/{name}.pomdp"));
         let path = path.display().to_string();
         // The values of network are those of successive steps.
         let all = match steps {

@@ -1,18 +1,19 @@
 //! `vigil pomdp compare` and `vigil pomdp generate` as a user sees them.
 
 use std::fs;
-use std::path::PathBuf;
 use std::process::{Command, Output};
 
 use serde_json::Value;
 use tempfile::TempDir;
 
+use super::workplace::root;
+
 const MODEL: &str = "config/navigation.pomdp";
 
 fn run(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_vigil-lab"));
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
-    command.args(arguments).current_dir(root).output().unwrap()
+    let command = command.args(arguments).current_dir(root());
+    command.output().unwrap()
 }
 
 fn text(arguments: &[&str]) -> String {
@@ -167,11 +168,7 @@ fn a_wrong_model_costs_what_simulating_the_right_one_shows() {
     let folder = TempDir::new().unwrap();
     let worse = folder.path().join("worse.toml");
     let model = folder.path().join("worse.pomdp");
-    let parameters = fs::read_to_string(format!(
-        "{}/../../config/navigation.toml",
-        env!("CARGO_MANIFEST_DIR")
-    ))
-    .unwrap();
+    let parameters = fs::read_to_string(root().join("config/navigation.toml")).unwrap();
     // Openings hardly ever help, new paths only at times.
     let changed = parameters
         .replace(
@@ -213,8 +210,7 @@ fn the_shipped_model_is_what_the_command_generates() {
         "av",
     ]);
     assert!(shipped.status.success());
-    let path = format!("{}/../../{MODEL}", env!("CARGO_MANIFEST_DIR"));
-    assert!(generated == fs::read_to_string(path).unwrap());
+    assert!(generated == fs::read_to_string(root().join(MODEL)).unwrap());
 }
 
 #[test]

@@ -1,12 +1,14 @@
 //! `vigil pomdp simulate`, `learn` and `picture` as a user sees them.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::Value;
 use tempfile::TempDir;
 use vigil_pomdp::Pomdp;
+
+use super::workplace::root;
 
 const MODEL: &str = "config/navigation.pomdp";
 
@@ -30,8 +32,8 @@ R: press : * : * : * -0.5
 
 fn run(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_vigil-lab"));
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
-    command.args(arguments).current_dir(root).output().unwrap()
+    let command = command.args(arguments).current_dir(root());
+    command.output().unwrap()
 }
 
 fn done(arguments: &[&str]) -> String {

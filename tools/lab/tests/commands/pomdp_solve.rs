@@ -1,12 +1,13 @@
 //! `vigil pomdp solve` as a user runs it.
 
 use std::fs;
-use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::Value;
 use vigil_pomdp::policy_file::{PolicyFile, alpha, appl};
 use vigil_pomdp::{Pomdp, mdp};
+
+use super::workplace::root;
 
 const TIGER: &str = "discount: 0.95\nstates: left right\nactions: listen open-left open-right\n\
     observations: hear-left hear-right\nT: * uniform\nT: listen identity\nO: * uniform\n\
@@ -118,7 +119,7 @@ fn a_timeout_leaves_a_bracket() {
 
 #[test]
 fn wrong_options_are_refused() {
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/rover.pomdp");
+    let shipped = root().join("config/rover.pomdp");
     let shipped = shipped.to_str().unwrap();
     let cases: [(&[&str], &str); 4] = [
         (&["--method", "magic"], "sarsop"),

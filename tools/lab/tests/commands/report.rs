@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 use flate2::read::GzDecoder;
@@ -10,15 +10,13 @@ use roxmltree::{Document, Node, ParsingOptions};
 use serde_json::Value;
 use tempfile::TempDir;
 
+use super::workplace::root;
+
 const MODEL: &str = "config/models/rover.toml";
 const RUNS: &str = "tests/data/rover/learn_runs.csv";
 /// Runs that the shipped model was not learned from: two nominal ones, six stuck wheels, two broken
 /// encoders.
 const IDS: [u32; 10] = [2, 22, 3, 7, 10, 12, 39, 66, 424, 431];
-
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
 
 fn evaluate(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_vigil-lab"))

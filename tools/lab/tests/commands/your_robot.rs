@@ -2,15 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::Value;
-use tempfile::TempDir;
 
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
+use super::workplace::{data, root, workplace_of};
 
 fn page() -> String {
     fs::read_to_string(root().join("docs/your-robot.md")).unwrap()
@@ -64,21 +61,6 @@ fn follow(command: &[String], folder: &Path) -> Output {
     command_of_page.args(&command[1..]).args(more);
     command_of_page.env_remove("VIGIL_CONFIG");
     command_of_page.current_dir(folder).output().unwrap()
-}
-
-/// A folder that looks like the project's, with the unpacked log in it.
-fn workplace(data: &str) -> TempDir {
-    let folder = TempDir::new().unwrap();
-    std::os::unix::fs::symlink(
-        root().join("config").canonicalize().unwrap(),
-        folder.path().join("config"),
-    )
-    .unwrap();
-    let packed = Path::new(data).join("real/kobuki_wheel_fault.tar.xz");
-    let mut tar = Command::new("tar");
-    tar.arg("-xJf").arg(&packed).arg("-C").arg(folder.path());
-    assert!(tar.status().unwrap().success(), "{}", packed.display());
-    folder
 }
 
 /// First alarm of every run of the verdicts, s, and the mode at its end.
@@ -191,11 +173,10 @@ fn check_replay(output: &Output) {
 
 #[test]
 fn the_page_can_be_followed_on_the_kobukis_data() {
-    let Ok(data) = std::env::var("VIGIL_DATA") else {
-        eprintln!("SKIPPED: VIGIL_DATA is not set");
+    let Some(data) = data() else {
         return;
     };
-    let folder = workplace(&data);
+    let folder = workplace_of("kobuki_wheel_fault", &data);
     fs::write(folder.path().join("labels.csv"), labels(&page())).unwrap();
     for command in commands(&page()) {
         let output = follow(&command, folder.path());
