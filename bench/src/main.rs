@@ -45,7 +45,7 @@ enum Question {
     Instructions(instructions::Args),
     /// How long from the schedule to the action, under load, and whose misses are they?
     Latency(latency::Args),
-    /// What is Vigil worth? Missions with random faults: with it, without, and with plainer rules.
+    /// What are the decisions worth? Missions with random faults: Vigil, and the best rules.
     Missions(missions::Args),
     /// Do the tests notice when a line of the filters, the decision or the cycle is wrong?
     Mutants(mutants::Args),

@@ -2,29 +2,55 @@
 
 use std::error::Error;
 
-use vigil_blocks::{Action, FaultBelief, RecoveryKind, SensorFrame};
-
-use super::arm::Arm;
-use super::escalation::{Escalation, Explanation, RuleInput, RuleOutput};
-use super::{ShippedGraph, Truth};
-use crate::simulated;
+use vigil_blocks::{Action, FaultBelief, MODE_MULTIPLE, RecoveryKind, SensorFrame};
 use vigil_evaluation::stages::Stages;
+
+use super::ShippedGraph;
+use super::breakdown::Cause;
+use super::rules::{Follower, Rule, RuleInput, RuleOutput};
+use super::told::{self, Knowledge};
+use crate::simulated;
+
+/// Who commands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Arm {
+    /// Detector, identifier and supervisor as they ship.
+    Vigil,
+    /// Rules over detector and identifier.
+    Rule(Rule),
+    /// Nobody watches: as planned, whatever happens.
+    Without,
+    /// Told what breaks when it begins, and how it will go on.
+    Told,
+}
+
+impl Arm {
+    /// In words.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Vigil => "Vigil",
+            Self::Rule(rule) => rule.name(),
+            Self::Without => "without",
+            Self::Told => "told the fault",
+        }
+    }
+}
 
 /// One of the commanders.
 pub(super) struct Commander<'a> {
     shipped: &'a ShippedGraph,
     mind: Mind,
     /// Leaves of the tree with what they mean.
-    leaves: Vec<(usize, Explanation)>,
+    leaves: Vec<(usize, Cause)>,
     action: Box<Action>,
 }
 
 enum Mind {
     Vigil(Box<Stages>),
+    Rule(Box<Stages>, Rule, Follower),
     Without,
-    Escalation(Box<Stages>, Escalation),
-    StopAndCall(Box<Stages>),
-    Oracle,
+    Told,
 }
 
 impl<'a> Commander<'a> {
@@ -38,108 +64,112 @@ impl<'a> Commander<'a> {
         let stages = || simulated::stages(&shipped.setup, sensors, rate_hz, seed).map(Box::new);
         let mind = match arm {
             Arm::Vigil => Mind::Vigil(stages()?),
+            Arm::Rule(rule) => Mind::Rule(stages()?, rule, Follower::new(rule)),
             Arm::Without => Mind::Without,
-            Arm::Escalation => Mind::Escalation(stages()?, Escalation::default()),
-            Arm::StopAndCall => Mind::StopAndCall(stages()?),
-            Arm::Oracle => Mind::Oracle,
+            Arm::Told => Mind::Told,
         };
-        let leaves = leaves(shipped);
         Ok(Self {
             shipped,
             mind,
-            leaves,
+            leaves: leaves(shipped),
             action: Box::default(),
         })
     }
 
-    /// The action after a frame; `dt_s` is the time between frames. Only the oracle looks at the
-    /// truth.
-    pub(super) fn command(&mut self, frame: &SensorFrame, truth: Truth, dt_s: f64) -> &Action {
-        let order = |kind| RuleOutput { kind, wheel: None };
+    /// The action after a frame; `dt_s` is the time between frames. Only who is told knows.
+    pub(super) fn command(
+        &mut self,
+        frame: &SensorFrame,
+        knowledge: &Knowledge<'_>,
+        dt_s: f64,
+    ) -> &Action {
         let output = match &mut self.mind {
             Mind::Vigil(stages) => {
                 stages.take(frame);
                 *self.action = *stages.action();
                 return &self.action;
             }
-            Mind::Without => order(RecoveryKind::GoOn),
-            Mind::Escalation(stages, rules) => {
+            Mind::Rule(stages, _, follower) => {
                 stages.take(frame);
+                let (explanation, p) = most_probable(&self.leaves, stages.diagnosis());
                 let alarm = stages.detection().alarm != 0;
-                let explanation = most_probable(&self.leaves, stages.diagnosis());
-                rules.answer(RuleInput { alarm, explanation }, dt_s)
+                let input = RuleInput {
+                    alarm,
+                    explanation,
+                    p,
+                    several: stages.diagnosis().mode == MODE_MULTIPLE,
+                };
+                follower.answer(input, dt_s)
             }
-            Mind::StopAndCall(stages) => {
-                stages.take(frame);
-                match stages.detection().alarm {
-                    0 => order(RecoveryKind::GoOn),
-                    _ => order(RecoveryKind::CallForHelp),
-                }
-            }
-            Mind::Oracle => RuleOutput {
-                kind: self.shipped.kind(self.shipped.solution.best(truth.state)),
-                wheel: truth.wheel,
-            },
+            Mind::Without => RuleOutput::plain(RecoveryKind::GoOn),
+            Mind::Told => told::best(&self.shipped.missions.prices, knowledge),
         };
         self.set_action(output);
-        self.action.valid_until_ns = u64::MAX;
         &self.action
     }
 
     /// Whoever has helped restarts what remembers; the filters see a new run.
     pub(super) fn begin_anew(&mut self) {
-        if let Mind::Escalation(_, rules) = &mut self.mind {
-            *rules = Escalation::default();
+        if let Mind::Rule(_, rule, follower) = &mut self.mind {
+            *follower = Follower::new(*rule);
         }
     }
 
     /// The action block of a kind, as the supervisor would write it.
     fn set_action(&mut self, RuleOutput { kind, wheel }: RuleOutput) {
-        let action = self.shipped.action(kind).unwrap_or_default();
         let steers = wheel.filter(|_| kind == RecoveryKind::Compensate);
         let straight = (1.0, 0.0);
         let (gain, offset) = steers.map_or(straight, |w| self.shipped.setup.model.compensation(w));
-        let remedies = matches!(kind, RecoveryKind::Compensate | RecoveryKind::IgnoreEncoder);
-        let about = wheel.filter(|_| remedies);
         *self.action = Action {
             decision_seq: 1,
-            action: action as u32,
             kind: kind as u32,
-            wheel: about.map_or(u32::MAX, |wheel| wheel as u32),
-            speed_scale: self.shipped.speed_scale(action),
+            wheel: wheel.map_or(u32::MAX, |wheel| wheel as u32),
+            speed_scale: speed_scale(kind),
             curvature_gain: gain,
             curvature_offset: offset,
+            valid_until_ns: u64::MAX,
             ..Action::default()
         };
     }
 }
 
-fn leaves(shipped: &ShippedGraph) -> Vec<(usize, Explanation)> {
+/// Share of the planned speed, as Vigil's actions have it by default.
+const fn speed_scale(kind: RecoveryKind) -> f64 {
+    match kind {
+        RecoveryKind::GoOn | RecoveryKind::IgnoreEncoder => 1.0,
+        RecoveryKind::Compensate => 0.7,
+        RecoveryKind::SlowDown => 0.5,
+        _ => 0.0,
+    }
+}
+
+fn leaves(shipped: &ShippedGraph) -> Vec<(usize, Cause)> {
     let tree = &shipped.setup.tree;
     let meaning = |node: usize| {
         let fault = tree.nodes().get(node)?.fault.as_deref()?;
         let (kind, wheel) = fault.split_once(':')?;
         let wheel = shipped.setup.robot.wheel_index(wheel)?;
-        let explanation = match kind {
-            "stuck" => Explanation::Stuck(wheel),
-            _ => Explanation::Encoder(wheel),
+        let cause = match kind {
+            "stuck" => Cause::Stuck(wheel),
+            _ => Cause::Encoder(wheel),
         };
-        Some((node, explanation))
+        Some((node, cause))
     };
     tree.leaves().filter_map(meaning).collect()
 }
 
-/// Ties go to nominal, then to the leaf that comes first.
-fn most_probable(leaves: &[(usize, Explanation)], belief: &FaultBelief) -> Explanation {
-    let mut best = (Explanation::Nominal, belief.p[0]);
-    for &(node, explanation) in leaves {
+/// The most probable explanation, `None` for none, and its probability. Ties go to none, then to
+/// the leaf that comes first.
+fn most_probable(leaves: &[(usize, Cause)], belief: &FaultBelief) -> (Option<Cause>, f64) {
+    let mut best = (None, belief.p[0]);
+    for &(node, cause) in leaves {
         let p = belief.p.get(node).copied().unwrap_or(0.0);
         if p > best.1 {
-            best = (explanation, p);
+            best = (Some(cause), p);
         }
     }
     if belief.p_unknown > best.1 {
-        best.0 = Explanation::Unknown;
+        best = (Some(Cause::Unmodelled), belief.p_unknown);
     }
-    best.0
+    best
 }

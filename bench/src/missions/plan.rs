@@ -4,7 +4,10 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vigil_setup::graph_file::{DriveSegment, Simulator};
 
-/// Metres commanded.
+use super::breakdown::Breakdown;
+use super::kind::Kind;
+
+/// Metres of the path.
 const LENGTH_M: f64 = 20.0;
 /// Length of a segment, m; the last is what is left.
 const SEGMENT_M: std::ops::Range<f64> = 2.0..5.0;
@@ -14,76 +17,11 @@ const CURVATURE_1_M: std::ops::Range<f64> = 0.1..0.5;
 const ONE_STRAIGHT_IN: u32 = 3;
 /// Speed of a segment, m/s.
 const SPEED_M_S: std::ops::Range<f64> = 0.15..0.3;
-/// Onset of the fault, as a share of the planned time.
-const ONSET: std::ops::Range<f64> = 0.1..0.8;
 /// Soil from mission to mission: as in the runs that the model was learned from.
 const MODULUS: std::ops::Range<f64> = 0.18..0.22;
 const FRICTION: std::ops::Range<f64> = 0.6..0.7;
-
-const WHEELS: [&str; 6] = ["LF", "LM", "LR", "RF", "RM", "RR"];
-const STEERED: [&str; 4] = ["LF", "LR", "RF", "RR"];
-const BROKEN: [&str; 3] = ["zero", "frozen", "noise"];
-/// What no model contains and what shows in the motion; `W` stands for a wheel, `S` for a steered
-/// one.
-const UNMODELLED: [&str; 10] = [
-    "steer-offset-hidden:S:0.2",
-    "steer-offset-hidden:S:-0.3",
-    "tether:40",
-    "slope:0.15",
-    "slope:-0.2",
-    "side-slope:0.15",
-    "side-slope:-0.25",
-    "brush:W:20",
-    "puncture:W:0.8",
-    "sinkage:W:10",
-];
-
-/// Kind of a mission.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// Nothing breaks.
-    Healthy,
-    /// A wheel sticks.
-    Stuck,
-    /// An encoder breaks.
-    Encoder,
-    /// Something happens that no model contains.
-    Unmodelled,
-}
-
-impl Kind {
-    /// All, each with its share of the missions, %.
-    pub const SHARES: [(Self, u32); 4] = [
-        (Self::Healthy, 20),
-        (Self::Stuck, 40),
-        (Self::Encoder, 25),
-        (Self::Unmodelled, 15),
-    ];
-
-    /// In words.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Healthy => "nothing",
-            Self::Stuck => "stuck wheel",
-            Self::Encoder => "broken encoder",
-            Self::Unmodelled => "unmodelled",
-        }
-    }
-}
-
-/// What breaks.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fault {
-    /// As `--inject` takes it.
-    pub spec: String,
-    /// State of the decision model from then on.
-    pub state: String,
-    /// The wheel of a modelled fault, by name.
-    pub wheel: Option<&'static str>,
-    /// When, s after the start.
-    pub onset_s: f64,
-}
+/// Seeds of one kind are so far from those of the next.
+const SEEDS: u64 = 1 << 32;
 
 /// A mission.
 #[derive(Debug, Clone)]
@@ -96,38 +34,36 @@ pub struct Plan {
     pub segments: Vec<DriveSegment>,
     /// Its kind.
     pub kind: Kind,
-    /// What breaks, unless it is a healthy one.
-    pub fault: Option<Fault>,
+    /// What breaks, unless nothing does.
+    pub breakdown: Option<Breakdown>,
 }
 
 impl Plan {
-    /// The mission of a seed.
+    /// The mission of a kind and seed.
     #[must_use]
-    pub fn new(seed: u64) -> Self {
+    pub fn new(kind: Kind, seed: u64) -> Self {
+        let seed = seed + kind as u64 * SEEDS;
         let mut rng = Pcg64Mcg::seed_from_u64(seed ^ 0x4d31_5510);
         let simulator = Simulator {
             friction: rng.random_range(FRICTION),
             shear_modulus: rng.random_range(MODULUS),
             ..Simulator::default()
         };
-        let segments = segments(&mut rng);
-        let kind = kind(&mut rng);
-        let mut plan = Self {
+        Self {
             seed,
             simulator,
-            segments,
+            segments: segments(&mut rng),
             kind,
-            fault: None,
-        };
-        let onset_s = plan.duration_s() * rng.random_range(ONSET);
-        plan.fault = fault(&mut rng, kind, onset_s);
-        plan
+            breakdown: Breakdown::drawn(kind, LENGTH_M, &mut rng),
+        }
     }
 
-    /// Time that the plan takes at its own speed, s.
+    /// So many missions of every kind, from a seed on.
     #[must_use]
-    pub fn duration_s(&self) -> f64 {
-        self.segments.iter().map(|s| s.duration_s).sum()
+    pub fn of_all_kinds(per_kind: u64, first_seed: u64) -> Vec<Self> {
+        let seeds = first_seed..first_seed + per_kind;
+        let of_a_kind = |kind| seeds.clone().map(move |seed| Self::new(kind, seed));
+        Kind::ALL.into_iter().flat_map(of_a_kind).collect()
     }
 }
 
@@ -153,78 +89,34 @@ fn segments(rng: &mut Pcg64Mcg) -> Vec<DriveSegment> {
     segments
 }
 
-fn kind(rng: &mut Pcg64Mcg) -> Kind {
-    let mut percent = rng.random_range(0..100);
-    let present = Kind::SHARES.iter().find(|(_, share)| {
-        let is_here = percent < *share;
-        percent = percent.saturating_sub(*share);
-        is_here
-    });
-    present.map_or(Kind::Healthy, |(kind, _)| *kind)
-}
-
-fn fault(rng: &mut Pcg64Mcg, kind: Kind, onset_s: f64) -> Option<Fault> {
-    let wheel = WHEELS[rng.random_range(0..WHEELS.len())];
-    let (spec, state, wheel) = match kind {
-        Kind::Healthy => return None,
-        Kind::Stuck => (
-            format!("stuck:{wheel}"),
-            format!("{wheel}_STUCK"),
-            Some(wheel),
-        ),
-        Kind::Encoder => {
-            let how = BROKEN[rng.random_range(0..BROKEN.len())];
-            let spec = format!("encoder:{wheel}:{how}");
-            (spec, format!("{wheel}_ENC"), Some(wheel))
-        }
-        Kind::Unmodelled => {
-            let steered = STEERED[rng.random_range(0..STEERED.len())];
-            let spec = UNMODELLED[rng.random_range(0..UNMODELLED.len())];
-            let spec = spec.replace(":W:", &format!(":{wheel}:"));
-            let spec = spec.replace(":S:", &format!(":{steered}:"));
-            (spec, "UNKNOWN".to_owned(), None)
-        }
-    };
-    Some(Fault {
-        spec,
-        state,
-        wheel,
-        onset_s,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::missions::ShippedGraph;
+    use crate::missions::breakdown::WHEELS;
 
     #[test]
-    fn missions_are_as_stated_and_every_fault_is_understood() {
-        let shipped = ShippedGraph::read(100.0).unwrap();
-        let plans: Vec<Plan> = (0..2000).map(Plan::new).collect();
-        for plan in &plans {
-            let length_m: f64 = plan
-                .segments
-                .iter()
-                .map(|s| s.duration_s * s.speed_m_s)
-                .sum();
-            assert!((length_m - LENGTH_M).abs() < 1e-9);
-            assert_eq!(plan.fault.is_none(), plan.kind == Kind::Healthy);
-            if let Some(fault) = &plan.fault {
-                shipped.change(&fault.spec).unwrap();
-                assert!(shipped.model().states().contains(&fault.state), "{fault:?}");
-                let share = fault.onset_s / plan.duration_s();
-                assert!(ONSET.contains(&share));
+    fn missions_are_as_stated_and_every_change_is_understood() {
+        let shipped = ShippedGraph::read("rover.toml".as_ref(), 100.0).unwrap();
+        let names = shipped.setup.robot.wheels.iter().map(|w| w.name.as_str());
+        assert!(names.eq(WHEELS));
+        for plan in Plan::of_all_kinds(50, 7) {
+            let lengths = plan.segments.iter().map(|s| s.duration_s * s.speed_m_s);
+            assert!((lengths.sum::<f64>() - LENGTH_M).abs() < 1e-9);
+            assert_eq!(plan.breakdown.is_none(), plan.kind == Kind::Nothing);
+            let Some(breakdown) = &plan.breakdown else {
+                continue;
+            };
+            assert!((2.0..16.0).contains(&breakdown.onset_m));
+            let times = breakdown.steps.iter().map(|step| step.after_s);
+            assert!(times.is_sorted(), "{breakdown:?}");
+            assert!(!breakdown.expected.is_empty());
+            for change in breakdown.steps.iter().filter_map(|s| s.change.as_ref()) {
+                shipped.change(change).unwrap();
             }
         }
-        for (kind, percent) in Kind::SHARES {
-            let found = plans.iter().filter(|plan| plan.kind == kind).count() as f64;
-            // Five standard deviations of a binomial share of 2000.
-            let p = f64::from(percent) / 100.0;
-            let sd = (2000.0 * p * (1.0 - p)).sqrt();
-            assert!((found - 2000.0 * p).abs() < 5.0 * sd, "{kind:?}: {found}");
-        }
-        let equal = |a: &Plan, b: &Plan| a.fault == b.fault && a.segments == b.segments;
-        assert!(equal(&plans[7], &Plan::new(7)) && !equal(&plans[7], &Plan::new(8)));
+        let equal = |a: &Plan, b: &Plan| a.breakdown == b.breakdown && a.segments == b.segments;
+        let plan = Plan::new(Kind::Two, 7);
+        assert!(equal(&plan, &Plan::new(Kind::Two, 7)) && !equal(&plan, &Plan::new(Kind::Two, 8)));
     }
 }

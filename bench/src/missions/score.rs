@@ -2,84 +2,65 @@
 
 use vigil_blocks::{Action, RecoveryKind};
 
-use super::ShippedGraph;
+use super::breakdown::{Cause, PresentFault};
+use super::prices::Prices;
+use super::rules::RuleOutput;
 
-/// The true state.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Truth {
-    /// Index in the decision model.
-    pub state: usize,
-    /// The broken wheel, if the state is about one.
-    pub wheel: Option<usize>,
-    /// Wheels that are dragged.
-    pub dragged: usize,
-}
+/// Driven farther than this with a fault that nobody answers, the mission ended unsafely, m.
+const UNANSWERED_MAX_M: f64 = 1.0;
+/// So did one that was farther off its path, m.
+const OFF_PATH_MAX_M: f64 = 1.0;
+/// What is less than this share of what it grows to is not counted as unanswered.
+const SEVERE: f64 = 0.5;
 
-/// What the rover obeys.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ObeyedOrder {
-    /// Index in the decision model.
-    pub action: usize,
-    /// Its kind.
-    pub kind: RecoveryKind,
-    /// The wheel that it is about.
-    pub wheel: Option<usize>,
-}
-
-impl ObeyedOrder {
-    /// What an action block says.
-    #[must_use]
-    pub fn new(action: &Action) -> Self {
-        Self {
-            action: action.action as usize,
-            kind: RecoveryKind::from_repr(action.kind).unwrap_or(RecoveryKind::None),
-            wheel: (action.wheel != u32::MAX).then_some(action.wheel as usize),
-        }
-    }
-
-    /// True if the rover stands under it.
-    #[must_use]
-    pub const fn stands(&self) -> bool {
-        matches!(
-            self.kind,
-            RecoveryKind::None | RecoveryKind::Stop | RecoveryKind::CallForHelp
-        )
+/// What an action block orders.
+#[must_use]
+pub(super) fn order(action: &Action) -> RuleOutput {
+    RuleOutput {
+        kind: RecoveryKind::from_repr(action.kind).unwrap_or(RecoveryKind::None),
+        wheel: (action.wheel != u32::MAX).then_some(action.wheel as usize),
     }
 }
 
-/// What the decision model pays.
-#[derive(Debug, Clone, Copy)]
-pub struct Pay<'a> {
-    shipped: &'a ShippedGraph,
-    go_on: Option<usize>,
-    epoch_s: f64,
+/// True if the rover stands under an order.
+const fn stands(order: RuleOutput) -> bool {
+    matches!(
+        order.kind,
+        RecoveryKind::None | RecoveryKind::Stop | RecoveryKind::CallForHelp
+    )
 }
 
-impl<'a> Pay<'a> {
-    /// As the shipped model states it, per epoch of the shipped supervisor.
-    #[must_use]
-    pub fn new(shipped: &'a ShippedGraph) -> Self {
-        Self {
-            shipped,
-            go_on: shipped.action(RecoveryKind::GoOn),
-            epoch_s: shipped.setup.file.supervisor.epoch_ms * 1e-3,
-        }
-    }
+/// True if an order is the remedy for a cause.
+fn remedies(order: RuleOutput, cause: Cause) -> bool {
+    cause != Cause::Unmodelled && order == RuleOutput::remedy(cause)
+}
 
-    /// Reward of `dt_s` under an action, in epochs' rewards. A remedy for another wheel than the
-    /// broken one is worth no more than going on.
-    #[must_use]
-    pub fn reward(&self, truth: Truth, obeyed: ObeyedOrder, dt_s: f64) -> f64 {
-        let model = self.shipped.model();
-        let stated = model.reward(truth.state, obeyed.action);
-        let is_wrong = |(at, broken): (usize, usize)| at != broken;
-        let wheels = obeyed.wheel.zip(truth.wheel);
-        let reward = match (wheels.is_some_and(is_wrong), self.go_on) {
-            (true, Some(go_on)) => stated.min(model.reward(truth.state, go_on)),
-            _ => stated,
+/// Price of a metre with these faults under an order, at a share of the planned speed. The price of
+/// a fault that is not answered falls with the speed.
+pub(super) fn price_1_m(
+    prices: &Prices,
+    faults: &[PresentFault],
+    order: RuleOutput,
+    speed: f64,
+) -> f64 {
+    let of = &prices.fault_1_m;
+    let priced = faults.iter().map(|fault| {
+        let price = match (fault.cause, remedies(order, fault.cause)) {
+            (Cause::Stuck(_), true) => of.stuck_compensated,
+            (Cause::Encoder(_), true) => of.encoder_ignored,
+            (Cause::Stuck(_), false) => of.stuck * speed,
+            (Cause::Encoder(_), false) => of.encoder * speed,
+            (Cause::Unmodelled, _) => of.unmodelled * speed,
         };
-        reward * dt_s / self.epoch_s
-    }
+        price * fault.severity
+    });
+    let is_needed = faults.iter().any(|fault| remedies(order, fault.cause));
+    let needless = match order.kind {
+        RecoveryKind::Compensate if !is_needed => prices.needless_1_m.compensation,
+        RecoveryKind::IgnoreEncoder if !is_needed => prices.needless_1_m.ignoring,
+        _ => 0.0,
+    };
+    priced.sum::<f64>() + needless
 }
 
 /// What adds up while a mission is driven.
@@ -88,56 +69,89 @@ pub(super) struct Tally {
     pub score: Score,
     stood: bool,
     called: bool,
+    off_path_m2_s: f64,
 }
 
 /// A step of a drive.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Step {
-    pub truth: Truth,
-    pub obeyed: ObeyedOrder,
-    /// True if standing is the best that can be done in this state.
+pub(super) struct Step<'a> {
+    pub faults: &'a [PresentFault],
+    pub obeyed: RuleOutput,
+    /// True if standing is what who is told would do, too.
     pub may_stand: bool,
-    /// Way of the body, m.
+    /// Way of the body, m, and progress along the path, m.
     pub moved_m: f64,
+    pub progress_m: f64,
+    /// Distance from the path, m.
+    pub off_path_m: f64,
+    /// Speed that the path asks for, m/s.
+    pub planned_m_s: f64,
     pub dt_s: f64,
 }
 
 impl Tally {
-    pub(super) fn add(&mut self, pay: &Pay<'_>, step: &Step) {
-        let Step { truth, obeyed, .. } = *step;
+    pub(super) fn add(&mut self, prices: &Prices, step: &Step<'_>) {
+        let Step { faults, obeyed, .. } = *step;
         let score = &mut self.score;
-        score.time_s += step.dt_s;
-        score.reward += pay.reward(truth, obeyed, step.dt_s);
-        score.dragged_m += step.moved_m * truth.dragged as f64;
         let count = |is: bool| f64::from(u8::from(is));
-        let stands = obeyed.stands();
+        let stands = stands(obeyed);
+        let calls = obeyed.kind == RecoveryKind::CallForHelp && !self.called;
+        score.time_s += step.dt_s;
+        score.calls += count(calls);
+        let speed = (step.moved_m / step.dt_s / step.planned_m_s).min(1.0);
+        let price = price_1_m(prices, faults, obeyed, speed);
+        score.points += prices.progress_1_m * step.progress_m
+            - prices.time_1_s * step.dt_s
+            - prices.call * count(calls)
+            - prices.off_path_1_m_s * step.off_path_m * step.dt_s
+            - price * step.moved_m;
         if stands && !step.may_stand {
-            score.unnecessary_stops += count(!self.stood);
-            score.unnecessary_s += step.dt_s;
+            score.needless_stops += count(!self.stood);
+            score.needless_s += step.dt_s;
         }
-        let calls = obeyed.kind == RecoveryKind::CallForHelp;
-        score.calls += count(calls && !self.called);
-        (self.stood, self.called) = (stands, calls);
+        let open =
+            |fault: &PresentFault| fault.severity >= SEVERE && !remedies(obeyed, fault.cause);
+        let goes_on = obeyed.kind != RecoveryKind::SlowDown && !stands;
+        if goes_on && faults.iter().any(open) {
+            score.unanswered_m += step.moved_m;
+        }
+        self.off_path_m2_s += step.off_path_m * step.off_path_m * step.dt_s;
+        score.off_path_rms_m = (self.off_path_m2_s / score.time_s).sqrt();
+        score.off_path_max_m = score.off_path_max_m.max(step.off_path_m);
+        let calling = obeyed.kind == RecoveryKind::CallForHelp;
+        (self.stood, self.called) = (stands, calling);
     }
 }
 
 /// A mission of one commander, measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Score {
-    /// Reward of the decision model, summed over the epochs.
-    pub reward: f64,
-    /// Metres with a stuck wheel.
-    pub dragged_m: f64,
-    /// Times the rover stopped though it could have driven on.
-    pub unnecessary_stops: f64,
+    /// Points by the prices.
+    pub points: f64,
+    /// Metres driven on while a fault was not answered.
+    pub unanswered_m: f64,
+    /// Distance from the path, m.
+    pub off_path_rms_m: f64,
+    /// Its largest, m.
+    pub off_path_max_m: f64,
+    /// Times the rover stopped though who is told would have driven on.
+    pub needless_stops: f64,
     /// Time it so stood, s.
-    pub unnecessary_s: f64,
+    pub needless_s: f64,
     /// Calls for help.
     pub calls: f64,
     /// Time, s.
     pub time_s: f64,
-    /// 1 if the plan was driven to its end.
+    /// 1 if the path was driven to its end.
     pub done: f64,
+}
+
+impl Score {
+    /// True if the mission ended unsafely.
+    #[must_use]
+    pub fn is_unsafe(&self) -> bool {
+        self.unanswered_m > UNANSWERED_MAX_M || self.off_path_max_m > OFF_PATH_MAX_M
+    }
 }
 
 /// A figure of a mission.
@@ -153,6 +167,38 @@ pub struct Measure {
     pub decimals: usize,
 }
 
+/// The points, which decide.
+pub const POINTS: Measure = measure("points", "points", |s| s.points, 1);
+
+/// What is reported of a mission; the points first.
+pub const MEASURES: [Measure; 10] = [
+    POINTS,
+    measure(
+        "unanswered_m",
+        "driven on unanswered, m",
+        |s| s.unanswered_m,
+        3,
+    ),
+    measure(
+        "off_path_rms_m",
+        "off the path, rms m",
+        |s| s.off_path_rms_m,
+        3,
+    ),
+    measure("off_path_max_m", "at most, m", |s| s.off_path_max_m, 3),
+    measure("needless_stops", "needless stops", |s| s.needless_stops, 3),
+    measure("needless_s", "so stood, s", |s| s.needless_s, 2),
+    measure("calls", "calls for help", |s| s.calls, 3),
+    measure("time_s", "time, s", |s| s.time_s, 1),
+    measure("done", "driven to the end", |s| s.done, 3),
+    measure(
+        "unsafe",
+        "ended unsafely",
+        |s| f64::from(u8::from(s.is_unsafe())),
+        4,
+    ),
+];
+
 const fn measure(
     key: &'static str,
     name: &'static str,
@@ -167,126 +213,83 @@ const fn measure(
     }
 }
 
-/// What is reported of a mission; the reward first.
-pub const MEASURES: [Measure; 7] = [
-    measure("reward", "mission reward", |s| s.reward, 0),
-    measure("dragged_m", "wheel dragged, m", |s| s.dragged_m, 2),
-    measure(
-        "unnecessary_stops",
-        "unnecessary stops",
-        |s| s.unnecessary_stops,
-        3,
-    ),
-    measure("unnecessary_s", "so stood, s", |s| s.unnecessary_s, 2),
-    measure("calls", "calls for help", |s| s.calls, 3),
-    measure("time_s", "time, s", |s| s.time_s, 1),
-    measure("done", "driven to the end", |s| s.done, 3),
-];
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::missions::prices::MissionFile;
 
-    fn shipped() -> ShippedGraph {
-        ShippedGraph::read(100.0).unwrap()
-    }
-
-    fn truth(shipped: &ShippedGraph, name: &str, wheel: Option<usize>) -> Truth {
-        let state = shipped
-            .model()
-            .states()
-            .iter()
-            .position(|s| s == name)
-            .unwrap();
-        let dragged = usize::from(name.ends_with("STUCK"));
-        Truth {
-            state,
-            wheel,
-            dragged,
-        }
-    }
-
-    fn obeyed(shipped: &ShippedGraph, kind: RecoveryKind, wheel: Option<usize>) -> ObeyedOrder {
-        let action = shipped.action(kind).unwrap();
-        ObeyedOrder {
-            action,
-            kind,
-            wheel,
-        }
+    const fn fault(cause: Cause, severity: f64) -> PresentFault {
+        PresentFault { cause, severity }
     }
 
     #[test]
-    fn rewards_are_those_of_the_model_per_epoch() {
-        use RecoveryKind::{CallForHelp, Compensate, GoOn, IgnoreEncoder, SlowDown, Stop};
-        let shipped = shipped();
-        let pay = Pay::new(&shipped);
-        let cases = [
-            ("ND", None, GoOn, None, 1.0),
-            ("ND", None, Compensate, Some(3), -2.0),
-            ("RM_STUCK", Some(4), GoOn, None, -4.0),
-            ("RM_STUCK", Some(4), Compensate, Some(4), 0.5),
-            // The wrong wheel: as going on.
-            ("RM_STUCK", Some(4), Compensate, Some(1), -4.0),
-            ("LF_ENC", Some(0), IgnoreEncoder, Some(0), 0.95),
-            ("LF_ENC", Some(0), IgnoreEncoder, Some(5), -1.0),
-            ("LF_ENC", Some(0), Compensate, Some(5), -2.0),
-            ("LF_ENC", Some(0), SlowDown, None, -0.3),
-            ("UNKNOWN", None, Stop, None, -1.2),
-            ("UNKNOWN", None, CallForHelp, None, -0.5),
+    fn a_metre_costs_what_each_fault_does_under_the_order() {
+        use RecoveryKind::{Compensate, GoOn, IgnoreEncoder, SlowDown};
+        let prices = MissionFile::read().unwrap().prices;
+        let order = |kind, wheel| RuleOutput { kind, wheel };
+        let stuck = [fault(Cause::Stuck(4), 1.0)];
+        let encoder = [fault(Cause::Encoder(0), 1.0)];
+        let both = [stuck[0], encoder[0]];
+        let half = [fault(Cause::Unmodelled, 0.5)];
+        let cases: [(&[PresentFault], RuleOutput, f64, f64); 10] = [
+            (&[], order(GoOn, None), 1.0, 0.0),
+            (&[], order(Compensate, Some(1)), 0.7, 100.0),
+            (&stuck, order(GoOn, None), 1.0, 200.0),
+            (&stuck, order(SlowDown, None), 0.5, 100.0),
+            (&stuck, order(Compensate, Some(4)), 0.7, 10.0),
+            (&stuck, order(Compensate, Some(1)), 0.5, 200.0),
+            (&encoder, order(IgnoreEncoder, Some(0)), 1.0, 2.5),
+            (&encoder, order(IgnoreEncoder, Some(3)), 1.0, 80.0),
+            (&both, order(Compensate, Some(4)), 1.0, 85.0),
+            (&half, order(SlowDown, None), 0.5, 87.5),
         ];
-        for (state, wheel, kind, about, per_epoch) in cases {
-            let truth = truth(&shipped, state, wheel);
-            let obeyed = obeyed(&shipped, kind, about);
-            // An epoch is 0.1 s.
-            let found = pay.reward(truth, obeyed, 0.025);
+        for (faults, order, speed, wanted) in cases {
+            let found = price_1_m(&prices, faults, order, speed);
             assert!(
-                (found - per_epoch / 4.0).abs() < 1e-12,
-                "{state} {kind:?}: {found}"
+                (found - wanted).abs() < 1e-9,
+                "{faults:?} {order:?}: {found}"
             );
-        }
-        assert!(shipped.may_stand(truth(&shipped, "UNKNOWN", None).state));
-        for driving in ["ND", "LF_STUCK", "RR_ENC"] {
-            assert!(!shipped.may_stand(truth(&shipped, driving, None).state));
         }
     }
 
     #[test]
     fn sums_over_a_mission_are_exact() {
-        use RecoveryKind::{CallForHelp, Compensate, GoOn, Stop};
-        let shipped = shipped();
-        let pay = Pay::new(&shipped);
+        let prices = MissionFile::read().unwrap().prices;
         let mut tally = Tally::default();
-        let healthy = truth(&shipped, "ND", None);
-        let stuck = truth(&shipped, "LM_STUCK", Some(1));
-        let unknown = truth(&shipped, "UNKNOWN", None);
+        let stuck = [fault(Cause::Stuck(1), 1.0)];
+        let obeyed = |kind, wheel| RuleOutput { kind, wheel };
+        use RecoveryKind::{CallForHelp, Compensate, GoOn};
+        // Two seconds each: healthy, unanswered, answered, and a call.
         let script = [
-            (healthy, GoOn, None, 1.0),
-            (healthy, Stop, None, 0.0),
-            (stuck, Stop, None, 0.0),
-            (stuck, Compensate, Some(1), 1.0),
-            (stuck, CallForHelp, None, 0.0),
-            (unknown, GoOn, None, 1.0),
-            (unknown, CallForHelp, None, 0.0),
+            (&[][..], obeyed(GoOn, None), 0.4),
+            (&stuck, obeyed(GoOn, None), 0.4),
+            (&stuck, obeyed(Compensate, Some(1)), 0.2),
+            (&stuck, obeyed(CallForHelp, None), 0.0),
         ];
-        // Each for 2 s of 0.1 m/s in steps of 20 ms, if it moves.
-        for (truth, kind, about, moves) in script {
-            let step = Step {
-                truth,
-                obeyed: obeyed(&shipped, kind, about),
-                may_stand: shipped.may_stand(truth.state),
-                moved_m: 0.002 * moves,
-                dt_s: 0.02,
-            };
-            (0..100).for_each(|_| tally.add(&pay, &step));
+        for (faults, obeyed, way_m) in script {
+            for _ in 0..100 {
+                tally.add(
+                    &prices,
+                    &Step {
+                        faults,
+                        obeyed,
+                        may_stand: false,
+                        moved_m: way_m / 100.0,
+                        progress_m: way_m / 200.0,
+                        off_path_m: 0.1,
+                        planned_m_s: 0.2,
+                        dt_s: 0.02,
+                    },
+                );
+            }
         }
         let score = tally.score;
-        let reward = 20.0 * (1.0 - 1.2 - 1.2 + 0.5 - 6.0 - 6.0 - 0.5);
-        assert!((score.reward - reward).abs() < 1e-9, "{}", score.reward);
-        assert!((score.dragged_m - 0.2).abs() < 1e-9);
-        // One stop, healthy and on with a wheel stuck; one call with a named fault. The last call
-        // is the best that can be done.
-        assert_eq!((score.unnecessary_stops, score.calls), (2.0, 2.0));
-        assert!((score.unnecessary_s - 6.0).abs() < 1e-9);
-        assert!((score.time_s - 14.0).abs() < 1e-9);
+        // Progress .5 m; 8 s; a call; 0.8 m s off the path; 0.4 m at 200 and 0.2 m at 10.
+        let points = 25.0 - 8.0 - 300.0 - 16.0 - 80.0 - 2.0;
+        assert!((score.points - points).abs() < 1e-9, "{}", score.points);
+        assert!((score.unanswered_m - 0.4).abs() < 1e-9);
+        assert!((score.off_path_rms_m - 0.1).abs() < 1e-9 && !score.is_unsafe());
+        assert_eq!((score.calls, score.needless_stops), (1.0, 1.0));
+        assert!((score.needless_s - 2.0).abs() < 1e-9);
     }
 }

@@ -1,97 +1,144 @@
-//! Means and paired differences of missions.
+//! Means and paired differences of missions, by kind and weighed over the kinds.
 
 use serde_json::{Value, json};
 use vigil_missions::simulation::{PairedDifference, Summary};
 
-use super::arm::Arm;
+use super::MissionFile;
+use super::commander::Arm;
 use super::drive::Mission;
-use super::plan::Kind;
+use super::kind::Kind;
 use super::score::{MEASURES, Measure, Score};
 
-/// Missions of a kind; all for `None`.
-pub(super) fn select(missions: &[Mission], kind: Option<Kind>) -> Vec<&Mission> {
-    let is = |mission: &&Mission| kind.is_none_or(|kind| mission.plan.kind == kind);
-    missions.iter().filter(is).collect()
+/// Odds of a fault over those of the file, at which overall figures are given.
+pub(super) const ODDS: [(f64, &str); 3] = [
+    (1.0, "as stated"),
+    (3.0, "three times the odds"),
+    (1.0 / 3.0, "a third of the odds"),
+];
+
+/// A mean with the half width of its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Interval {
+    pub mean: f64,
+    pub half_width: f64,
 }
 
-fn values(missions: &[&Mission], arm: Arm, of: fn(&Score) -> f64) -> Vec<f64> {
-    let at = Arm::ALL.iter().position(|other| *other == arm).unwrap_or(0);
-    missions.iter().map(|m| of(&m.scores[at])).collect()
-}
+impl Interval {
+    pub(super) fn lower(self) -> f64 {
+        self.mean - self.half_width
+    }
 
-/// Of one figure, what a commander brings.
-pub(super) fn summary(missions: &[&Mission], arm: Arm, measure: Measure) -> Summary {
-    Summary::new(&mut values(missions, arm, measure.of))
-}
-
-/// Of one figure, Vigil less another commander.
-pub(super) fn against(missions: &[&Mission], other: Arm, measure: Measure) -> PairedDifference {
-    let ours = values(missions, Arm::Vigil, measure.of);
-    PairedDifference::new(&ours, &values(missions, other, measure.of))
-}
-
-/// All figures of these missions.
-pub(super) fn figures(missions: &[&Mission]) -> Value {
-    let mut arms = json!({});
-    for arm in Arm::ALL {
-        for measure in MEASURES {
-            let found = summary(missions, arm, measure);
-            let mut value = json!({
-                "mean": found.mean, "half_width_95": found.half_width, "median": found.median,
-            });
-            if arm != Arm::Vigil {
-                let paired = against(missions, arm, measure);
-                value["vigil_minus_this"] = json!({
-                    "mean": paired.difference, "half_width_95": paired.half_width, "p": paired.p,
-                });
-            }
-            arms[arm.name()][measure.key] = value;
+    pub(super) fn text(self, decimals: usize, is_difference: bool) -> String {
+        let Self { mean, half_width } = self;
+        match is_difference {
+            true => format!("{mean:+.decimals$} ± {half_width:.decimals$}"),
+            false => format!("{mean:.decimals$} ± {half_width:.decimals$}"),
         }
     }
-    json!({ "missions": missions.len(), "arms": arms })
+
+    fn document(self) -> Value {
+        json!({"mean": self.mean, "half_width_95": self.half_width})
+    }
 }
 
-/// Rows of a table: every figure, a column for each commander.
-pub(super) fn means(missions: &[&Mission]) -> Vec<String> {
-    let names: Vec<&str> = Arm::ALL.iter().map(|arm| arm.name()).collect();
-    let mut rows = vec![
-        format!("| mean ± 95 % | {} |", names.join(" | ")),
-        format!("|---|{}", "---|".repeat(names.len())),
-    ];
-    for measure in MEASURES {
-        let cell = |arm: &Arm| {
-            let found = summary(missions, *arm, measure);
-            let places = measure.decimals;
-            format!("{:.places$} ± {:.places$}", found.mean, found.half_width)
-        };
-        let cells: Vec<String> = Arm::ALL.iter().map(cell).collect();
-        rows.push(format!("| {} | {} |", measure.name, cells.join(" | ")));
-    }
-    rows
+/// What was driven, by whom.
+pub(super) struct Table<'a> {
+    pub file: &'a MissionFile,
+    pub arms: &'a [Arm],
+    pub missions: &'a [Mission],
 }
 
-/// Rows of a table: every figure, Vigil less each other commander.
-pub(super) fn differences(missions: &[&Mission]) -> Vec<String> {
-    let others: Vec<Arm> = Arm::ALL.into_iter().filter(|a| *a != Arm::Vigil).collect();
-    let names: Vec<&str> = others.iter().map(|arm| arm.name()).collect();
-    let mut rows = vec![
-        format!(
-            "| Vigil less ... (± 95 %, paired) | {} |",
-            names.join(" | ")
-        ),
-        format!("|---|{}", "---|".repeat(names.len())),
-    ];
-    for measure in MEASURES {
-        let cell = |arm: &Arm| {
-            let found = against(missions, *arm, measure);
-            let places = measure.decimals;
-            format!(
-                "{:+.places$} ± {:.places$}",
-                found.difference, found.half_width
-            )
-        };
-        let cells: Vec<String> = others.iter().map(cell).collect();
-        rows.push(format!("| {} | {} |", measure.name, cells.join(" | ")));
+impl Table<'_> {
+    pub(super) fn of_kind(&self, kind: Kind) -> impl Iterator<Item = &Mission> {
+        self.missions.iter().filter(move |m| m.plan.kind == kind)
     }
-    rows
+
+    fn values(&self, kind: Kind, arm: usize, of: fn(&Score) -> f64) -> Vec<f64> {
+        let scores = self.of_kind(kind).filter_map(|m| m.scores.get(arm));
+        scores.map(of).collect()
+    }
+
+    /// What a commander brings in missions of a kind.
+    pub(super) fn mean(&self, kind: Kind, arm: usize, measure: Measure) -> Interval {
+        let found = Summary::new(&mut self.values(kind, arm, measure.of));
+        Interval {
+            mean: found.mean,
+            half_width: found.half_width,
+        }
+    }
+
+    /// Vigil less another commander, in missions of a kind.
+    pub(super) fn against(&self, kind: Kind, arm: usize, measure: Measure) -> Interval {
+        let ours = self.values(kind, 0, measure.of);
+        let found = PairedDifference::new(&ours, &self.values(kind, arm, measure.of));
+        Interval {
+            mean: found.difference,
+            half_width: found.half_width,
+        }
+    }
+
+    /// Over all kinds, weighed by their shares: the parts are independent, so that variances add.
+    pub(super) fn over_kinds(&self, odds: f64, of_kind: impl Fn(Kind) -> Interval) -> Interval {
+        let parts = Kind::ALL.map(|kind| (self.file.share(kind, odds), of_kind(kind)));
+        let mean = parts.iter().map(|(share, part)| share * part.mean).sum();
+        let squares = parts
+            .iter()
+            .map(|(share, part)| (share * part.half_width).powi(2));
+        Interval {
+            mean,
+            half_width: squares.sum::<f64>().sqrt(),
+        }
+    }
+
+    /// Commanders that follow rules, by their place.
+    pub(super) fn rules(&self) -> impl Iterator<Item = usize> {
+        let all = self.arms.iter().enumerate();
+        all.filter(|(_, arm)| matches!(arm, Arm::Rule(_)))
+            .map(|(at, _)| at)
+    }
+
+    /// The rule with the most points over all kinds.
+    pub(super) fn best_rule(&self, odds: f64) -> Option<usize> {
+        let points = |arm: &usize| {
+            let of_kind = |kind| self.mean(kind, *arm, super::POINTS);
+            self.over_kinds(odds, of_kind).mean
+        };
+        self.rules().max_by(|a, b| points(a).total_cmp(&points(b)))
+    }
+
+    /// All figures of a selection: its name, the mean of a commander and the difference to it.
+    fn figures(
+        &self,
+        mean: impl Fn(usize, Measure) -> Interval,
+        against: impl Fn(usize, Measure) -> Interval,
+    ) -> Value {
+        let mut figures = json!({});
+        for (at, arm) in self.arms.iter().enumerate() {
+            for measure in MEASURES {
+                let mut value = mean(at, measure).document();
+                if at > 0 {
+                    value["vigil_minus_this"] = against(at, measure).document();
+                }
+                figures[arm.name()][measure.key] = value;
+            }
+        }
+        figures
+    }
+
+    pub(super) fn document(&self) -> Value {
+        let mut document = json!({});
+        for (odds, name) in ODDS {
+            document["overall"][name] = self.figures(
+                |arm, measure| self.over_kinds(odds, |kind| self.mean(kind, arm, measure)),
+                |arm, measure| self.over_kinds(odds, |kind| self.against(kind, arm, measure)),
+            );
+        }
+        for kind in Kind::ALL {
+            document["kinds"][kind.name()] = self.figures(
+                |arm, measure| self.mean(kind, arm, measure),
+                |arm, measure| self.against(kind, arm, measure),
+            );
+        }
+        document
+    }
 }

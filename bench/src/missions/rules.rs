@@ -1,0 +1,148 @@
+//! The rules to beat: what a good engineer writes over the same detector and identifier.
+//!
+//! Each family is tuned: every pause, threshold and order that it has is swept on other missions
+//! than those of the measurement ([`super::sweep`]).
+
+mod careful;
+mod ladder;
+mod stop_and_call;
+
+pub use careful::{Careful, CarefulSettings};
+pub use ladder::{Ladder, LadderSettings};
+pub use stop_and_call::{StopAndCall, StopAndCallSettings};
+
+use serde::Deserialize;
+use vigil_blocks::RecoveryKind;
+
+use super::breakdown::Cause;
+
+/// What the rules see in one cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RuleInput {
+    /// The detector's alarm.
+    pub alarm: bool,
+    /// The identifier's most probable explanation; `None` if nothing is wrong.
+    pub explanation: Option<Cause>,
+    /// Its probability.
+    pub p: f64,
+    /// True if the identifier holds two faults or more for more probable than not.
+    pub several: bool,
+}
+
+/// What the rules say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RuleOutput {
+    /// Kind of action.
+    pub kind: RecoveryKind,
+    /// The wheel it is about.
+    pub wheel: Option<usize>,
+}
+
+impl RuleOutput {
+    /// An action that is about no wheel.
+    #[must_use]
+    pub const fn plain(kind: RecoveryKind) -> Self {
+        Self { kind, wheel: None }
+    }
+
+    /// What a cause asks for: counter-steer, ignore the encoder, go slowly.
+    #[must_use]
+    pub const fn remedy(cause: Cause) -> Self {
+        let (kind, wheel) = match cause {
+            Cause::Stuck(wheel) => (RecoveryKind::Compensate, Some(wheel)),
+            Cause::Encoder(wheel) => (RecoveryKind::IgnoreEncoder, Some(wheel)),
+            Cause::Unmodelled => (RecoveryKind::SlowDown, None),
+        };
+        Self { kind, wheel }
+    }
+}
+
+/// The best of each family.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rules {
+    /// Looks, then remedies.
+    pub careful: CarefulSettings,
+    /// Stops, then calls for help.
+    pub stop_and_call: StopAndCallSettings,
+    /// Slows down, stops, calls for help, whatever it is.
+    pub ladder: LadderSettings,
+}
+
+/// A rule with its settings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Rule {
+    /// Looks, then remedies.
+    Careful(CarefulSettings),
+    /// Stops, then calls for help.
+    StopAndCall(StopAndCallSettings),
+    /// Slows down, stops, calls for help, whatever it is.
+    Ladder(LadderSettings),
+}
+
+impl Rule {
+    /// In words.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Careful(_) => "careful",
+            Self::StopAndCall(_) => "stop and call",
+            Self::Ladder(_) => "ladder",
+        }
+    }
+
+    /// Settings that can be varied.
+    #[must_use]
+    pub const fn dimensions(&self) -> usize {
+        match self {
+            Self::Careful(_) => CarefulSettings::DIMENSIONS,
+            Self::StopAndCall(_) => StopAndCallSettings::DIMENSIONS,
+            Self::Ladder(_) => LadderSettings::DIMENSIONS,
+        }
+    }
+
+    /// The rule with each value that one of its settings may have.
+    #[must_use]
+    pub fn varied(&self, dimension: usize) -> Vec<Self> {
+        match self {
+            Self::Careful(s) => s.varied(dimension).into_iter().map(Self::Careful).collect(),
+            Self::StopAndCall(s) => {
+                let varied = s.varied(dimension).into_iter();
+                varied.map(Self::StopAndCall).collect()
+            }
+            Self::Ladder(s) => s.varied(dimension).into_iter().map(Self::Ladder).collect(),
+        }
+    }
+}
+
+/// What follows a rule, one cycle at a time.
+#[derive(Debug, Clone)]
+pub enum Follower {
+    /// Looks, then remedies.
+    Careful(Careful),
+    /// Stops, then calls for help.
+    StopAndCall(StopAndCall),
+    /// Slows down, stops, calls for help.
+    Ladder(Ladder),
+}
+
+impl Follower {
+    /// At the beginning.
+    #[must_use]
+    pub const fn new(rule: Rule) -> Self {
+        match rule {
+            Rule::Careful(settings) => Self::Careful(Careful::new(settings)),
+            Rule::StopAndCall(settings) => Self::StopAndCall(StopAndCall::new(settings)),
+            Rule::Ladder(settings) => Self::Ladder(Ladder::new(settings)),
+        }
+    }
+
+    /// The rule's answer, `dt_s` after the last cycle.
+    pub fn answer(&mut self, input: RuleInput, dt_s: f64) -> RuleOutput {
+        match self {
+            Self::Careful(rule) => rule.answer(input, dt_s),
+            Self::StopAndCall(rule) => rule.answer(input, dt_s),
+            Self::Ladder(rule) => rule.answer(input, dt_s),
+        }
+    }
+}
