@@ -15,8 +15,6 @@ use vigil_cycle::{
 };
 use vigil_detector::DetectorStage;
 use vigil_identifier::IdentifierStage;
-use vigil_pomdp::solver::{Options, solve};
-use vigil_pomdp::{Budget, PointBased};
 use vigil_sensor_sim::{SensorSource, SimulatorSource};
 use vigil_setup::{GraphArgs, Setup};
 use vigil_supervisor::SupervisorStage;
@@ -30,7 +28,7 @@ const CYCLES: u64 = 1200;
 /// A sensor frame is held back in this cycle: the deadlines pass.
 const SILENT: u64 = 900;
 
-/// The default graph; by a policy that was solved beforehand, if so wished.
+/// The default graph, by its solved policy or by a heuristic.
 fn setup(is_solved: bool) -> Setup {
     let config = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../config/rover.toml");
     let args = GraphArgs {
@@ -38,17 +36,10 @@ fn setup(is_solved: bool) -> Setup {
         ..GraphArgs::default()
     };
     let mut setup = args.load().unwrap();
-    if is_solved {
-        let model = &setup.decision;
-        let options = Options {
-            precision: 0.15,
-            ..Options::default()
-        };
-        let mut never = || false;
-        let budget = &mut Budget::new(&mut never);
-        let found = solve(model, &options, budget, &mut |_| ()).unwrap();
-        setup.policy = Some(PointBased::new(model, &found.vectors.unwrap()).unwrap());
-        setup.file.supervisor.policy = "point-based".to_owned();
+    if !is_solved {
+        setup.policy = None;
+        setup.file.supervisor.policy = "qmdp".to_owned();
+        setup.file.supervisor.policy_file = None;
     }
     setup
 }

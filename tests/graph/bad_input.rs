@@ -26,6 +26,7 @@ fn changed(folder: &Path, file: &str, from: &str, to: &str) {
     for name in [
         "rover.toml",
         "rover.pomdp",
+        "rover.policy.json",
         "robots/rover.toml",
         "trees/rover.toml",
         "models/rover.toml",
@@ -119,7 +120,7 @@ const BAD: [(&str, &str, &str, &[&str]); 13] = [
     ),
     (
         "rover.toml",
-        "stop = { kind",
+        "slow_down = { kind",
         "halt = { kind",
         &["[supervisor.actions]", "'halt'"],
     ),

@@ -54,6 +54,7 @@ pub fn config_with(folder: &Path, change: impl FnOnce(String) -> String) -> Path
         "trees/rover.toml",
         "models/rover.toml",
         "rover.pomdp",
+        "rover.policy.json",
     ];
     let path = folder.join("rover.toml");
     std::fs::write(&path, change(models.into_iter().fold(text, absolute))).unwrap();

@@ -9,6 +9,9 @@
 //!   only the best.
 //! - A call for help stands until the filters are reset by whoever has helped. A robot that brakes
 //!   and then stands looks healthy, whatever is wrong with it: what pulls at it pulls no more.
+//!
+//! A model that knows how old the unknown is (`UNKNOWN_OLD`) says itself when to call for help and
+//! when to go on. Of these rules only the last holds for it.
 
 use vigil_blocks::RecoveryKind;
 use vigil_pomdp::policy::choose_among;
@@ -32,18 +35,46 @@ pub(crate) struct ActionHysteresis {
     candidate: usize,
     epochs: u32,
     help_epochs: u32,
-    /// Epochs for which going on must be best before it is taken again, and whether it was left.
-    hold_epochs: u32,
+    needed: Needed,
+    /// True once going on was left.
     has_left: bool,
     /// The action that calls for help, once it has been taken.
     called: Option<usize>,
 }
 
+/// Epochs for which an action must be best before it is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Needed {
+    /// Calling for help.
+    help: u32,
+    /// Any that is faster than the present one.
+    faster: u32,
+    /// Going on, once it was left.
+    going_on: u32,
+}
+
 impl ActionHysteresis {
     /// Going on, once left, must be best for `hold_epochs`, and [`HOLD_EPOCHS`] at least.
     pub(crate) fn new(hold_epochs: u32) -> Self {
+        Self::of(Needed {
+            help: HELP_EPOCHS,
+            faster: HOLD_EPOCHS,
+            going_on: hold_epochs.max(HOLD_EPOCHS),
+        })
+    }
+
+    /// The best action is taken at once: the decision model knows what it is to wait for.
+    pub(crate) const fn at_once() -> Self {
+        Self::of(Needed {
+            help: 0,
+            faster: 0,
+            going_on: 0,
+        })
+    }
+
+    const fn of(needed: Needed) -> Self {
         Self {
-            hold_epochs: hold_epochs.max(HOLD_EPOCHS),
+            needed,
             has_left: false,
             candidate: usize::MAX,
             epochs: 0,
@@ -54,7 +85,7 @@ impl ActionHysteresis {
 
     /// Forgets everything: a new run, or whoever has helped.
     pub(crate) fn reset(&mut self) {
-        *self = Self::new(self.hold_epochs);
+        *self = Self::of(self.needed);
     }
 
     /// The call for help that stands.
@@ -88,7 +119,7 @@ impl ActionHysteresis {
             self.help_epochs = self.help_epochs.saturating_add(u32::from(timed));
             let calling = current.is_some_and(is_help);
             let others = (0..values.len()).any(|action| !is_help(action));
-            if self.help_epochs < HELP_EPOCHS && !calling && others {
+            if self.help_epochs < self.needed.help && !calling && others {
                 choice = Choice {
                     control: best.control,
                     ..choose_among(values, |action| !is_help(action))
@@ -101,7 +132,8 @@ impl ActionHysteresis {
         self.has_left |= !goes_on(meanings, choice.action);
         let choice = self.held_back(current, choice, meanings, timed);
         self.has_left &= !goes_on(meanings, choice.action);
-        if self.called.is_none() && self.help_epochs >= HELP_EPOCHS && is_help(choice.action) {
+        let has_waited = self.help_epochs >= self.needed.help;
+        if self.called.is_none() && has_waited && is_help(choice.action) {
             self.called = Some(choice.action);
         }
         assert_latched(latched, self.called);
@@ -127,8 +159,8 @@ impl ActionHysteresis {
         // Going on at the same speed gives up what was done about a fault, too.
         let resumes = self.has_left && goes_on(meanings, choice.action) && choice.action != current;
         let needed = match resumes {
-            true => self.hold_epochs,
-            false if speed(choice.action) > speed(current) => HOLD_EPOCHS,
+            true => self.needed.going_on,
+            false if speed(choice.action) > speed(current) => self.needed.faster,
             false => 0,
         };
         if self.epochs < needed {
@@ -247,8 +279,8 @@ mod tests {
         assert_eq!(robot.act(IGNORE, false), IGNORE);
         robot.hysteresis.reset();
         assert_eq!(robot.act(GO, false), GO, "a reset ends the hold too");
-        assert_eq!(robot.hysteresis.hold_epochs, 5);
-        assert_eq!(Robot::new(1).hysteresis.hold_epochs, HOLD_EPOCHS);
+        assert_eq!(robot.hysteresis.needed.going_on, 5);
+        assert_eq!(Robot::new(1).hysteresis.needed.going_on, HOLD_EPOCHS);
     }
 
     #[test]
@@ -270,6 +302,18 @@ mod tests {
         robot.epochs(19, HELP);
         robot.act(SLOW, true);
         assert!(robot.epochs(19, HELP).iter().all(|action| *action == SLOW));
+    }
+
+    #[test]
+    fn a_model_that_knows_what_to_wait_for_is_obeyed_at_once_and_its_call_stands() {
+        let mut robot = Robot::new(0);
+        robot.hysteresis = ActionHysteresis::at_once();
+        let said = [GO, SLOW, GO, STOP, SLOW].map(|action| robot.act(action, true));
+        assert_eq!(said, [GO, SLOW, GO, STOP, SLOW]);
+        assert_eq!(robot.act(HELP, false), HELP);
+        assert_eq!(robot.act(GO, true), HELP);
+        robot.hysteresis.reset();
+        assert_eq!(robot.act(GO, false), GO);
     }
 
     #[test]

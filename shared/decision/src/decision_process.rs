@@ -206,7 +206,6 @@ fn assert_sound(action: &Action) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     fn sound() -> Action {
         let mut action = Action {
@@ -235,13 +234,12 @@ mod tests {
         assert_sound(&action);
     }
 
-    /// A process of the shipped decision model.
+    /// A process of the tests' decision model.
     fn process() -> DecisionProcess {
-        let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config");
-        let read = |name: &str| std::fs::read_to_string(config.join(name)).unwrap();
-        let graph: toml::Table = read("rover.toml").parse().unwrap();
-        let settings: Settings = graph["supervisor"].clone().try_into().unwrap();
-        let model = Pomdp::parse(&read("rover.pomdp")).unwrap();
+        let settings = include_str!("../tests/decision/world/by_hand.toml");
+        let settings: Settings = toml::from_str(settings).unwrap();
+        let model = include_str!("../tests/decision/world/by_hand.pomdp");
+        let model = Pomdp::parse(model).unwrap();
         DecisionProcess::new(model, None, &settings, 3).unwrap()
     }
 

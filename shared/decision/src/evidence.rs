@@ -14,18 +14,20 @@
 //! robot stands still and shows nothing. Clearing needs evidence, and the identifier has it.
 //!
 //! States exclude each other, faults do not: what is taken over goes by the identifier's exact
-//! sets of faults. A set of one stuck wheel, whatever encoders are broken with it, is the state of
-//! that wheel: to counter-steer for it is right then. A set of encoders is shared among them. A set
-//! of two or more stuck wheels is UNKNOWN: the yaw of one wheel alone is not what the robot does,
-//! and counter-steering for it would lead off the path. What the sets that are reported leave of a
-//! leaf's probability counts for the leaf. What has no name is nothing before the fused alarm: the
+//! sets of faults. A set of several is the state SEVERAL. In a model without that state a set of one
+//! stuck wheel, whatever encoders are broken with it, is the state of that wheel, a set of encoders
+//! is shared among them, and a set of two or more stuck wheels is UNKNOWN: the yaw of one wheel
+//! alone is not what the robot does, and counter-steering for it would lead off the path. What the
+//! sets that are reported leave of a leaf's probability counts for the leaf. States that stand for
+//! the same (UNKNOWN and UNKNOWN_OLD) share its probability as they did before: the identifier says
+//! nothing of a fault's age, the decision model's transitions do. What has no name is nothing before the fused alarm: the
 //! odds of a departure wander on a healthy robot too, and the alarm alone is calibrated. From the
 //! alarm on it is what the identifier says. Quotients are of single leaves, and the drift from the
 //! sets, which is looked at in each epoch, bounds what they may say about several.
 
 use vigil_blocks::{DECISION_STATES, FaultBelief, FaultSet};
 
-use crate::mapping::StateMeaning;
+use crate::mapping::{StateMeaning, Subject};
 
 /// One cycle can change the odds of a state by this factor at most, as a logarithm. Chosen by hand:
 /// e^20 is beyond any odds that a decision turns on, and one wild cycle cannot outweigh an epoch.
@@ -46,6 +48,8 @@ pub(crate) const P_TOLERANCE: f64 = 1e-6;
 #[derive(Debug, Clone)]
 pub(crate) struct EpochEvidence {
     log_likelihood: [f64; DECISION_STATES],
+    /// Probability of several faults in the cycle before: sets have no predicted one.
+    several: f64,
     /// Whether the identifier identifies, and whether an alarm stands.
     reports: Option<(u32, bool)>,
     mode_changes: u32,
@@ -65,6 +69,7 @@ impl EpochEvidence {
     pub(crate) const fn new() -> Self {
         Self {
             log_likelihood: [0.0; DECISION_STATES],
+            several: 0.0,
             reports: None,
             mode_changes: 0,
             writer_epoch: 0,
@@ -83,6 +88,7 @@ impl EpochEvidence {
         let before = std::mem::replace(&mut self.reports, reports);
         let changes = std::mem::replace(&mut self.mode_changes, diagnosis.mode_change_count);
         let writer = std::mem::replace(&mut self.writer_epoch, diagnosis.header.epoch);
+        let several = std::mem::replace(&mut self.several, p_several(diagnosis));
         if before != reports
             || changes != diagnosis.mode_change_count
             || writer != diagnosis.header.epoch
@@ -92,7 +98,12 @@ impl EpochEvidence {
         }
         for (sum, meaning) in self.log_likelihood.iter_mut().zip(states) {
             let (p, predicted) = probabilities(diagnosis, *meaning, alarm);
-            *sum = (*sum + log_ratio(p, predicted)).clamp(-LOG_EPOCH_MAX, LOG_EPOCH_MAX);
+            let log_ratio = match meaning.subject {
+                Subject::Done => -LOG_RATIO_MAX,
+                Subject::Several => log_ratio(p, several),
+                _ => log_ratio(p, predicted),
+            };
+            *sum = (*sum + log_ratio).clamp(-LOG_EPOCH_MAX, LOG_EPOCH_MAX);
         }
         Effect::Wait
     }
@@ -131,19 +142,20 @@ pub(crate) fn assert_likelihoods(likelihood: &[f64]) {
 /// Those of several leaves add up, to more than 1 where they may be present together.
 fn probabilities(diagnosis: &FaultBelief, meaning: StateMeaning, alarm: bool) -> (f64, f64) {
     let unknown = (diagnosis.p_unknown, diagnosis.p_unknown_predicted);
-    match meaning.node {
-        None if meaning.unknown && alarm => unknown,
-        None if meaning.unknown => (0.0, 0.0),
-        None => {
+    match meaning.subject {
+        Subject::Unknown if alarm => unknown,
+        Subject::Unknown | Subject::Done => (0.0, 0.0),
+        Subject::Several => (p_several(diagnosis), 0.0),
+        Subject::Others => {
             let leaves = || (0..64).filter(|leaf| meaning.leaves >> leaf & 1 == 1);
             let sum = |p: &[f64]| leaves().filter_map(|leaf| p.get(leaf)).sum();
             (sum(&diagnosis.p), sum(&diagnosis.p_predicted))
         }
-        Some(0) if !alarm => (
+        Subject::Node(0) if !alarm => (
             (diagnosis.p[0] + unknown.0).min(1.0),
             (diagnosis.p_predicted[0] + unknown.1).min(1.0),
         ),
-        Some(node) => (
+        Subject::Node(node) => (
             diagnosis.p.get(node).copied().unwrap_or(0.0),
             diagnosis.p_predicted.get(node).copied().unwrap_or(0.0),
         ),
@@ -159,19 +171,49 @@ fn log_ratio(p: f64, predicted: f64) -> f64 {
     ratio.ln().clamp(-LOG_RATIO_MAX, LOG_RATIO_MAX)
 }
 
-/// Writes the identifier's belief over the decision model's states into `weights`.
+/// Writes the identifier's belief over the decision model's states into `weights`; `belief` is the
+/// one before.
 pub(crate) fn weights(
     diagnosis: &FaultBelief,
     states: &[StateMeaning],
     alarm: bool,
+    belief: &[f64],
     weights: &mut [f64],
 ) {
     for (weight, meaning) in weights.iter_mut().zip(states) {
         *weight = probabilities(diagnosis, *meaning, alarm).0;
     }
-    for set in reported(diagnosis).filter(|set| set.leaves.count_ones() > 1) {
+    for set in sets_of_several(diagnosis) {
         divide(set, states, weights);
     }
+    share_unknown(states, belief, weights);
+}
+
+/// Divides the probability of the unknown among its states as `belief` does; the first has it all
+/// where that holds none of it possible.
+fn share_unknown(states: &[StateMeaning], belief: &[f64], weights: &mut [f64]) {
+    let is_unknown = |meaning: &StateMeaning| meaning.subject == Subject::Unknown;
+    let believed = states.iter().zip(belief).filter(|(m, _)| is_unknown(m));
+    let sum: f64 = believed.map(|(_, b)| b).sum();
+    let mut is_first = true;
+    let shares = weights.iter_mut().zip(states).zip(belief);
+    for ((weight, _), b) in shares.filter(|((_, m), _)| is_unknown(m)) {
+        *weight *= match (sum > 0.0, is_first) {
+            (true, _) => b / sum,
+            (false, true) => 1.0,
+            (false, false) => 0.0,
+        };
+        is_first = false;
+    }
+}
+
+/// Sets in use of two faults or more.
+fn sets_of_several(diagnosis: &FaultBelief) -> impl Iterator<Item = &FaultSet> {
+    reported(diagnosis).filter(|set| set.leaves.count_ones() > 1)
+}
+
+fn p_several(diagnosis: &FaultBelief) -> f64 {
+    sets_of_several(diagnosis).map(|set| set.p).sum()
 }
 
 /// The sets in use.
@@ -183,20 +225,27 @@ fn reported(diagnosis: &FaultBelief) -> impl Iterator<Item = &FaultSet> {
 /// that it is.
 fn divide(set: &FaultSet, states: &[StateMeaning], weights: &mut [f64]) {
     let is_in = |meaning: &StateMeaning| set.leaves & meaning.leaves != 0;
+    if states.iter().any(|m| m.subject == Subject::Several) {
+        for (weight, meaning) in weights.iter_mut().zip(states).filter(|(_, m)| is_in(m)) {
+            let own = f64::from((set.leaves & meaning.leaves).count_ones());
+            *weight = (*weight - own * set.p).max(0.0);
+        }
+        return;
+    }
     let stuck = states.iter().filter(|m| is_in(m) && m.stuck).count();
     let share = match stuck {
         0 => set.p / f64::from(set.leaves.count_ones()),
         _ => 0.0,
     };
     for (weight, meaning) in weights.iter_mut().zip(states) {
-        if is_in(meaning) && meaning.node.is_none() {
+        if is_in(meaning) && meaning.subject == Subject::Others {
             // Several leaves of one state: the set counts once.
             let own = f64::from((set.leaves & meaning.leaves).count_ones());
             let kept = if stuck == 0 { own * share } else { 0.0 };
             *weight = (*weight - own * set.p).max(0.0) + kept;
         } else if is_in(meaning) && !(stuck == 1 && meaning.stuck) {
             *weight = (*weight - set.p).max(0.0) + share;
-        } else if stuck > 1 && meaning.unknown {
+        } else if stuck > 1 && meaning.subject == Subject::Unknown {
             *weight += set.p;
         }
     }
@@ -237,7 +286,10 @@ mod tests {
 
     const fn state(node: Option<usize>, stuck: bool) -> StateMeaning {
         StateMeaning {
-            node,
+            subject: match node {
+                Some(node) => Subject::Node(node),
+                None => Subject::Unknown,
+            },
             leaves: match node {
                 None | Some(0) => 0,
                 Some(node) => match 1_u64.checked_shl(node as u32) {
@@ -245,7 +297,6 @@ mod tests {
                     None => 0,
                 },
             },
-            unknown: node.is_none(),
             wheel: None,
             stuck,
         }
@@ -254,8 +305,8 @@ mod tests {
     #[test]
     fn the_state_of_all_faults_has_the_probability_of_any_of_them() {
         let any = StateMeaning {
+            subject: Subject::Others,
             leaves: 0b110,
-            unknown: false,
             ..state(None, false)
         };
         let states = [state(Some(0), false), any, state(None, false)];
@@ -269,8 +320,8 @@ mod tests {
     #[test]
     fn a_state_of_leaves_that_come_together_counts_each_set_once() {
         let any = StateMeaning {
+            subject: Subject::Others,
             leaves: 0b110,
-            unknown: false,
             ..state(None, false)
         };
         let none = StateMeaning { leaves: 0, ..any };
@@ -396,7 +447,7 @@ mod tests {
             (set.leaves, set.p) = (*leaves, *p);
         }
         let mut out = [0.0; N];
-        weights(&said, states, true, &mut out);
+        weights(&said, states, true, &[0.0; N], &mut out);
         out
     }
 
@@ -410,6 +461,54 @@ mod tests {
         assert_eq!(encoders, [0.25, 0.0, 0.0, 0.25, 0.5, 0.0]);
         let two_stuck = weighed(&[0.0, 0.75, 0.5], &[(0b00110, 0.5)]);
         assert_eq!(two_stuck, [0.0, 0.25, 0.0, 0.0, 0.0, 0.5]);
+    }
+
+    #[test]
+    fn a_state_of_several_faults_has_their_sets_whole() {
+        let several = StateMeaning {
+            subject: Subject::Several,
+            ..state(None, false)
+        };
+        let states = [STATES[0], STATES[1], STATES[3], several];
+        let said = diagnosis(&[0.25, 0.5, 0.0, 0.75], 0.0);
+        let sets = [(0b01010, 0.5), (0b01000, 0.25)];
+        assert_eq!(weighed_over(&states, said, &sets), [0.25, 0.0, 0.25, 0.5]);
+        // Their evidence is how their probability changes.
+        let cycle = |p| {
+            let mut said = said;
+            said.set_count = 1;
+            (said.sets[0].leaves, said.sets[0].p) = (0b01010, p);
+            said
+        };
+        let mut gathered = EpochEvidence::new();
+        for p in [0.125, 0.25, 0.5] {
+            gathered.add(&cycle(p), &states, true);
+        }
+        assert!((gathered.log_likelihood[3] - 4.0_f64.ln()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn states_of_the_unknown_share_it_as_before_and_the_end_is_never_believed() {
+        let done = StateMeaning {
+            subject: Subject::Done,
+            ..state(None, false)
+        };
+        let unknown = state(None, false);
+        let states = [STATES[0], unknown, unknown, done];
+        let said = diagnosis(&[0.5], 0.5);
+        for (belief, wanted) in [
+            ([0.2, 0.1, 0.3, 0.4], [0.5, 0.125, 0.375, 0.0]),
+            ([1.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0]),
+        ] {
+            let mut found = [0.0; 4];
+            weights(&said, &states, true, &belief, &mut found);
+            let distance = found.iter().zip(wanted).map(|(f, w)| (f - w).abs());
+            assert!(distance.fold(0.0, f64::max) < 1e-12, "{found:?}");
+        }
+        let mut gathered = EpochEvidence::new();
+        gathered.add(&said, &states, true);
+        gathered.add(&said, &states, true);
+        assert_eq!(gathered.log_likelihood[3], -LOG_RATIO_MAX);
     }
 
     #[test]

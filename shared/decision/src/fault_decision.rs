@@ -8,7 +8,7 @@ use crate::alarm_fusion::Situation;
 use crate::decision_process::{DecisionProcess, DecisionRule, Instruction};
 use crate::evidence::{self, Effect, EpochEvidence};
 use crate::inputs::Inputs;
-use crate::mapping::{self, Compensation, StateMeaning, SupervisorError};
+use crate::mapping::{self, Compensation, StateMeaning, Subject, SupervisorError};
 use crate::settings::Settings;
 
 /// Tracks the belief over the leaves of the fault tree, nominal and unknown, and chooses actions.
@@ -21,6 +21,9 @@ pub(crate) struct FaultDecision {
     epoch_t_capture_ns: Option<u64>,
     gathered: EpochEvidence,
     hysteresis: ActionHysteresis,
+    /// The model knows how old the unknown is. Then its transitions are for that alone: what is
+    /// wrong the identifier says, in every epoch.
+    knows_age: bool,
     /// True while the present action stands although another is better.
     is_held: bool,
     instruction: Option<Instruction>,
@@ -39,6 +42,12 @@ impl FaultDecision {
         let states = mapping::states(&process.model, tree, robot)?;
         mapping::check_compensation(&process.model, &states, &process.actions, &compensation)?;
         let hold_epochs = (settings.hold_s * 1e3 / settings.epoch_ms).ceil() as u32;
+        let unknown = states.iter().filter(|m| m.subject == Subject::Unknown);
+        let knows_age = unknown.count() > 1;
+        let hysteresis = match knows_age {
+            true => ActionHysteresis::at_once(),
+            false => ActionHysteresis::new(hold_epochs),
+        };
         let mut rule = Self {
             process,
             tree_hash: tree.hash(),
@@ -47,12 +56,24 @@ impl FaultDecision {
             epoch_ns: (settings.epoch_ms * 1e6) as u64,
             epoch_t_capture_ns: None,
             gathered: EpochEvidence::new(),
-            hysteresis: ActionHysteresis::new(hold_epochs),
+            hysteresis,
+            knows_age,
             is_held: false,
             instruction: None,
         };
-        rule.decide(false);
+        rule.begin();
         Ok(rule)
+    }
+
+    /// A run begins with nothing wrong, as the identifier's does. The model's own start is what its
+    /// policy was solved for.
+    fn begin(&mut self) {
+        let is_nominal = |m: &StateMeaning| f64::from(u8::from(m.subject == Subject::Node(0)));
+        for (weight, meaning) in self.process.scratch.iter_mut().zip(&self.states) {
+            *weight = is_nominal(meaning);
+        }
+        self.process.tracker.anchor(&self.process.scratch);
+        self.decide(false);
     }
 
     fn take_diagnosis(&mut self, diagnosis: &FaultBelief, alarm: bool) {
@@ -65,20 +86,27 @@ impl FaultDecision {
         let process = &mut self.process;
         process.control_mode = ControlMode::Policy;
         if effect == Effect::Anchor {
-            evidence::weights(diagnosis, &self.states, alarm, &mut process.scratch);
+            let belief = process.tracker.belief();
+            evidence::weights(diagnosis, &self.states, alarm, belief, &mut process.scratch);
             process.tracker.anchor(&process.scratch);
             process.log_evidence = 0.0;
             self.decide(timed);
         } else if timed {
-            let action = process.choice.action;
-            process.tracker.predict(&process.model, action);
+            // A call is one step of the model, however long it takes: it ends with a reset.
+            if self.hysteresis.called().is_none() {
+                process
+                    .tracker
+                    .predict(&process.model, process.choice.action);
+            }
             self.gathered.take(&mut process.scratch);
             let evidence = process.tracker.weigh(&process.scratch);
             if let Some(log_probability) = process.log_probability(evidence) {
                 process.log_evidence = log_probability;
             }
-            evidence::weights(diagnosis, &self.states, alarm, &mut process.scratch);
-            if evidence::has_drifted(process.tracker.belief(), &process.scratch) {
+            let belief = process.tracker.belief();
+            evidence::weights(diagnosis, &self.states, alarm, belief, &mut process.scratch);
+            let belief = process.tracker.belief();
+            if self.knows_age || evidence::has_drifted(belief, &process.scratch) {
                 process.tracker.anchor(&process.scratch);
             }
             self.decide(timed);
@@ -106,7 +134,7 @@ impl FaultDecision {
             false => 0.0,
         };
         let belief = self.process.tracker.belief();
-        let is_nominal = |meaning: &StateMeaning| meaning.node == Some(0);
+        let is_nominal = |meaning: &StateMeaning| meaning.subject == Subject::Node(0);
         let faulty: f64 = belief
             .iter()
             .zip(&self.states)
@@ -233,7 +261,7 @@ impl DecisionRule for FaultDecision {
         self.gathered.forget();
         self.hysteresis.reset();
         self.epoch_t_capture_ns = None;
-        self.decide(false);
+        self.begin();
     }
 
     fn latched(&self) -> Option<usize> {

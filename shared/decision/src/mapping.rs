@@ -12,8 +12,14 @@ use vigil_robot::FaultTree;
 
 /// Name of the decision model's state for deviations that no fault model explains.
 const UNKNOWN: &str = "UNKNOWN";
+/// Name of the same deviation after some time, when waiting for a name has not helped.
+const UNKNOWN_OLD: &str = "UNKNOWN_OLD";
 /// Name of the state of all named faults that have no state of their own.
 const FAULT: &str = "FAULT";
+/// Name of the state of two faults or more.
+const SEVERAL: &str = "SEVERAL";
+/// Name of the state after the end of the task. It is never believed: what goes on has not ended.
+const DONE: &str = "DONE";
 
 /// Counter-steering that lets a robot with a stuck wheel drive the commanded curvature.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,7 +53,10 @@ pub enum SupervisorError {
     )]
     NoState(String),
     /// A state means nothing in the fault tree.
-    #[error("state '{0}' of the decision model is no leaf of the fault tree, ND, FAULT or UNKNOWN")]
+    #[error(
+        "state '{0}' of the decision model is no leaf of the fault tree, ND, FAULT, SEVERAL, \
+         UNKNOWN, UNKNOWN_OLD or DONE"
+    )]
     NoLeaf(String),
     /// An action of the model is not mapped.
     #[error("action '{0}' of the decision model is missing in [supervisor.actions]")]
@@ -125,15 +134,28 @@ pub(crate) fn state(
     name.map(index).transpose()
 }
 
-/// Which node of the fault tree, and which wheel, a state of the decision model stands for.
+/// What a state of the decision model stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Subject {
+    /// A node of the fault tree: a leaf, or 0 for nominal.
+    Node(usize),
+    /// Every leaf without a state of its own.
+    Others,
+    /// Two leaves or more.
+    Several,
+    /// What no modelled fault explains.
+    Unknown,
+    /// The task is done.
+    Done,
+}
+
+/// What a state stands for, and the wheel that it is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct StateMeaning {
-    /// Node of the fault tree; `None` for UNKNOWN and FAULT.
-    pub node: Option<usize>,
+    /// What it stands for.
+    pub subject: Subject,
     /// The leaves that it stands for, as bits.
     pub leaves: u64,
-    /// True for what no modelled fault explains.
-    pub unknown: bool,
     /// Wheel of the fault.
     pub wheel: Option<usize>,
     /// True if the fault is a stuck wheel.
@@ -178,11 +200,17 @@ fn meaning(
     robot: &Description,
     others: u64,
 ) -> Result<StateMeaning, SupervisorError> {
-    if name == UNKNOWN || name == FAULT {
+    let subject = match name {
+        UNKNOWN | UNKNOWN_OLD => Some(Subject::Unknown),
+        FAULT => Some(Subject::Others),
+        SEVERAL => Some(Subject::Several),
+        DONE => Some(Subject::Done),
+        _ => None,
+    };
+    if let Some(subject) = subject {
         return Ok(StateMeaning {
-            node: None,
+            subject,
             leaves: if name == FAULT { others } else { 0 },
-            unknown: name == UNKNOWN,
             wheel: None,
             stuck: false,
         });
@@ -199,9 +227,8 @@ fn meaning(
         .and_then(|w| robot.wheel_index(w));
     let stuck = fault.is_some_and(|f| f.starts_with("stuck:"));
     Ok(StateMeaning {
-        node: Some(node),
+        subject: Subject::Node(node),
         leaves: if node == 0 { 0 } else { 1 << node },
-        unknown: false,
         wheel,
         stuck,
     })
@@ -341,8 +368,7 @@ mod tests {
         };
         let states = [Some(3), Some(4)].map(|wheel| StateMeaning {
             leaves: 0,
-            node: wheel,
-            unknown: false,
+            subject: Subject::Node(1),
             wheel,
             stuck: wheel == Some(4),
         });

@@ -1,6 +1,8 @@
 //! Missions of a decision model: [`simulation`] flies them and compares policies, [`learning`]
-//! finds the model's probabilities from recorded ones, [`navigation`] writes the paper's model.
+//! finds the model's probabilities from recorded ones, [`navigation`] writes the paper's model, and
+//! [`recovery`] that of what to do about faults.
 
 pub mod learning;
 pub mod navigation;
+pub mod recovery;
 pub mod simulation;

@@ -5,9 +5,8 @@ use vigil_blocks::{ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKin
 use vigil_cycle::allocation::allocations;
 use vigil_decision::{Compensation, Inputs, Supervisor};
 use vigil_pomdp::{Policy, Pomdp, QMdp, mdp};
-use vigil_setup::graph_file::GraphFile;
 
-use crate::world::{CYCLE_NS, World, config, model};
+use crate::world::{self, CYCLE_NS, World, model};
 
 #[test]
 fn every_certain_state_has_the_action_that_a_driver_would_expect() {
@@ -272,9 +271,7 @@ fn before_the_first_diagnosis_the_start_belief_decides() {
 #[test]
 fn what_does_not_fit_is_named() {
     let World { tree, robot, .. } = World::new();
-    let text = std::fs::read_to_string(config().join("rover.toml")).unwrap();
-    let settings = toml::from_str::<GraphFile>(&text).unwrap().supervisor;
-    let source = std::fs::read_to_string(config().join("rover.pomdp")).unwrap();
+    let (settings, source) = (world::settings(), world::MODEL);
     let all: Vec<Compensation> = (0..6)
         .map(|wheel| Compensation {
             wheel,

@@ -7,9 +7,8 @@ use vigil_decision::Settings;
 use vigil_decision::{Inputs, Supervisor};
 use vigil_pomdp::policy::{Base, Dual, PolicyName, normalised_entropy};
 use vigil_pomdp::{Pomdp, mdp};
-use vigil_setup::graph_file::GraphFile;
 
-use crate::world::{CYCLE_NS, World, config, model};
+use crate::world::{self, CYCLE_NS, World, config, model};
 
 fn names() -> impl Iterator<Item = String> {
     let prefixes = ["", "dm-", "adm-"];
@@ -170,16 +169,13 @@ fn settings_that_do_not_fit_the_model_are_named() {
         let world = World::new();
         (world.tree, world.robot)
     };
-    let text = std::fs::read_to_string(config().join("rover.toml")).unwrap();
     let message = |change: &dyn Fn(&mut Settings)| {
-        let mut settings = toml::from_str::<GraphFile>(&text).unwrap().supervisor;
+        let mut settings = world::settings();
         dual("dm-qmdp")(&mut settings);
         change(&mut settings);
-        let source = std::fs::read_to_string(config().join("rover.pomdp")).unwrap();
         // Without compensating there is nothing to compensate with.
         settings.actions.get_mut("compensate").unwrap().kind = vigil_decision::Recovery::SlowDown;
-        let model = Pomdp::parse(&source).unwrap();
-        let built = Supervisor::new(model, None, &tree, &robot, &settings, Vec::new(), 10);
+        let built = Supervisor::new(model(), None, &tree, &robot, &settings, Vec::new(), 10);
         built.err().unwrap().to_string()
     };
     let wrong = message(&|s| s.information_actions = vec!["look".into()]);
@@ -205,6 +201,8 @@ fn settings_that_do_not_fit_the_model_are_named() {
 fn the_configuration_is_checked_before_anything_is_built() {
     let problems = |change: fn(&mut Settings)| {
         let loaded = vigil_setup::load_graph(&config().join("rover.toml"), |file| {
+            file.supervisor.policy = "qmdp".to_owned();
+            file.supervisor.policy_file = None;
             change(&mut file.supervisor);
         });
         loaded

@@ -10,7 +10,7 @@ use vigil_pomdp::{AlphaVectors, Budget, PointBased, Policy, Pomdp, mdp};
 use crate::public::TIGER;
 
 const NAVIGATION: &str = include_str!("../../../../config/navigation.pomdp");
-const ROVER: &str = include_str!("../../../../config/rover.pomdp");
+const FAULTS: &str = include_str!("../../../decision/tests/decision/world/by_hand.pomdp");
 
 fn solved(model: &Pomdp, precision: f64) -> AlphaVectors {
     let options = Options {
@@ -60,7 +60,7 @@ fn beliefs(states: usize) -> impl Iterator<Item = Vec<f64>> {
 
 #[test]
 fn values_are_those_of_one_step_of_planning_if_the_state_is_certain_else_at_most() {
-    for (model, precision) in [(TIGER, 1e-3), (NAVIGATION, 0.3), (ROVER, 0.3)] {
+    for (model, precision) in [(TIGER, 1e-3), (NAVIGATION, 0.3), (FAULTS, 0.3)] {
         let model = Pomdp::parse(model).unwrap();
         let (states, actions) = (model.states().len(), model.actions().len());
         let vectors = solved(&model, precision);

@@ -10,4 +10,5 @@ mod learning_navigation;
 mod navigation;
 mod public;
 mod recorded;
+mod recovery;
 mod simulation;

@@ -1,4 +1,4 @@
-//! A supervisor with the shipped models, with what the identifier believes in each cycle.
+//! A supervisor with a decision model by hand, with what the identifier believes in each cycle.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,6 @@ use vigil_decision::{Compensation, Inputs, Supervisor};
 use vigil_pomdp::Pomdp;
 use vigil_robot::Description;
 use vigil_robot::FaultTree;
-use vigil_setup::graph_file::GraphFile;
 
 /// Time between cycles.
 pub const CYCLE_NS: u64 = 10_000_000;
@@ -17,9 +16,17 @@ pub fn config() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config")
 }
 
-/// The shipped decision model.
+/// A decision model of the rover's faults that is no generated one.
+pub const MODEL: &str = include_str!("by_hand.pomdp");
+
+/// The decision model.
 pub fn model() -> Pomdp {
-    Pomdp::parse(&std::fs::read_to_string(config().join("rover.pomdp")).unwrap()).unwrap()
+    Pomdp::parse(MODEL).unwrap()
+}
+
+/// The settings that fit it.
+pub fn settings() -> vigil_decision::Settings {
+    toml::from_str(include_str!("by_hand.toml")).unwrap()
 }
 
 /// A supervisor and what it takes.
@@ -32,17 +39,16 @@ pub struct World {
 }
 
 impl World {
-    /// With the shipped configuration.
+    /// With its settings.
     pub fn new() -> Self {
         Self::with(|_| {})
     }
 
-    /// With the shipped configuration, changed.
+    /// With its settings, changed.
     pub fn with(change: impl FnOnce(&mut vigil_decision::Settings)) -> Self {
         let tree = vigil_setup::load_tree(&config().join("trees/rover.toml")).unwrap();
         let robot = vigil_setup::load_robot(&config().join("robots/rover.toml")).unwrap();
-        let text = std::fs::read_to_string(config().join("rover.toml")).unwrap();
-        let mut settings = toml::from_str::<GraphFile>(&text).unwrap().supervisor;
+        let mut settings = settings();
         change(&mut settings);
         let compensation = (0..6)
             .map(|wheel| Compensation {

@@ -1,0 +1,328 @@
+//! From parameters and leaves to a `.pomdp` text.
+
+use std::fmt::Write as _;
+
+use super::parameters::{ActionParameters, Fault, ParameterError, Parameters};
+
+/// Class of every leaf that no other class has, and the name of its state.
+const REST: &str = "*";
+const FAULT: &str = "FAULT";
+/// Significant digits after the first.
+const DIGITS: usize = 11;
+
+const HEAD: &str = "\
+# What to do about a fault. Generated: change the parameters, not this file.
+#
+# A step is one epoch of the supervisor. Rewards are what a robot pays beyond its way. The start is
+# an alarm that has just risen: a policy is solved for it; a run of the supervisor begins nominal.
+";
+
+/// A leaf of the fault tree.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Leaf {
+    /// Its name.
+    pub name: String,
+    /// Its fault: `stuck:LF`.
+    pub fault: String,
+}
+
+/// What a state of the model is.
+#[derive(Clone, Copy)]
+enum Condition<'a> {
+    Nominal,
+    Fault { class: &'a Fault, members: f64 },
+    Several,
+    Unknown { is_old: bool },
+    Done,
+}
+
+/// A state.
+struct State<'a> {
+    name: &'a str,
+    condition: Condition<'a>,
+}
+
+/// Writes the model, in Cassandra's format.
+///
+/// # Errors
+/// [`ParameterError`] if a parameter means nothing, or does not fit the leaves.
+pub fn generate(parameters: &Parameters, leaves: &[Leaf]) -> Result<String, ParameterError> {
+    parameters.check()?;
+    let model = Model {
+        parameters,
+        states: states(parameters, leaves)?,
+    };
+    let names: Vec<&str> = model.states.iter().map(|state| state.name).collect();
+    let actions = parameters.action.iter().map(|action| action.name.as_str());
+    let actions: Vec<&str> = actions.chain([parameters.help.action.as_str()]).collect();
+    let mut text = String::from(HEAD);
+    line(&mut text, &format!("discount: {}", parameters.discount));
+    line(&mut text, "values: reward");
+    line(&mut text, &format!("states: {}", names.join(" ")));
+    line(&mut text, &format!("actions: {}", actions.join(" ")));
+    line(
+        &mut text,
+        &format!("observations: none {}", names.join(" ")),
+    );
+    line(&mut text, &format!("start: {}", row(&model.start())));
+    line(
+        &mut text,
+        "\n# What arises, joins, is named, grows old, passes, ends.",
+    );
+    for action in &parameters.action {
+        for (from, name) in names.iter().enumerate() {
+            let next = row(&model.next(action, from)?);
+            line(&mut text, &format!("T: {} : {name}\n{next}", action.name));
+        }
+    }
+    let help = &parameters.help.action;
+    line(
+        &mut text,
+        &format!("T: {help} : *\n{}", row(&model.only(0))),
+    );
+    line(
+        &mut text,
+        &format!("T: {help} : DONE\n{}", row(&model.only(names.len() - 1))),
+    );
+    line(
+        &mut text,
+        "\n# What the evidence of a step speaks for most.",
+    );
+    for action in &parameters.action {
+        for (to, name) in names.iter().enumerate() {
+            let seen = model.seen(action.sees, to);
+            line(
+                &mut text,
+                &format!("O: {} : {name}\n{}", action.name, row(&seen)),
+            );
+        }
+    }
+    for (to, name) in names.iter().enumerate() {
+        line(
+            &mut text,
+            &format!("O: {help} : {name}\n{}", row(&model.seen(0.0, to))),
+        );
+    }
+    line(&mut text, "\n# What a step costs.");
+    for (state, name) in model.states.iter().zip(&names) {
+        if matches!(state.condition, Condition::Done) {
+            continue;
+        }
+        for action in &parameters.action {
+            let price = number(-model.price(action, state.condition));
+            line(
+                &mut text,
+                &format!("R: {} : {name} : * : * {price}", action.name),
+            );
+        }
+        let waits = parameters.task.price_1_s * parameters.help.wait_s;
+        let price = number(-parameters.help.price - waits);
+        line(&mut text, &format!("R: {help} : {name} : * : * {price}"));
+    }
+    Ok(text)
+}
+
+/// States in the model's order: nominal first, the end last.
+fn states<'a>(
+    parameters: &'a Parameters,
+    leaves: &'a [Leaf],
+) -> Result<Vec<State<'a>>, ParameterError> {
+    let word = |leaf: &'a Leaf| leaf.fault.split(':').next().unwrap_or_default();
+    let classes = &parameters.fault;
+    let of = |name: &str| classes.iter().find(|class| class.leaves == name);
+    let class = |leaf: &'a Leaf| of(word(leaf)).or_else(|| of(REST));
+    if let Some(leaf) = leaves.iter().find(|leaf| class(leaf).is_none()) {
+        return Err(ParameterError::NoClass {
+            leaf: leaf.name.clone(),
+            fault: leaf.fault.clone(),
+        });
+    }
+    let members = |class: &Fault| {
+        leaves
+            .iter()
+            .filter(|leaf| word(leaf) == class.leaves)
+            .count()
+    };
+    let mut states = vec![State {
+        name: "ND",
+        condition: Condition::Nominal,
+    }];
+    for class in classes {
+        if class.leaves != REST && members(class) == 0 {
+            return Err(ParameterError::NoLeaf(class.leaves.clone()));
+        }
+        let fault = |name, members| State {
+            name,
+            condition: Condition::Fault { class, members },
+        };
+        match class.leaves == REST {
+            true => states.push(fault(FAULT, 1.0)),
+            false => {
+                let own = leaves.iter().filter(|leaf| word(leaf) == class.leaves);
+                let count = members(class) as f64;
+                states.extend(own.map(|leaf| fault(leaf.name.as_str(), count)));
+            }
+        }
+    }
+    states.extend(
+        [
+            ("SEVERAL", Condition::Several),
+            ("UNKNOWN", Condition::Unknown { is_old: false }),
+            ("UNKNOWN_OLD", Condition::Unknown { is_old: true }),
+            ("DONE", Condition::Done),
+        ]
+        .map(|(name, condition)| State { name, condition }),
+    );
+    Ok(states)
+}
+
+struct Model<'a> {
+    parameters: &'a Parameters,
+    states: Vec<State<'a>>,
+}
+
+impl Model<'_> {
+    /// A distribution of one state.
+    fn only(&self, state: usize) -> Vec<f64> {
+        (0..self.states.len())
+            .map(|other| f64::from(u8::from(other == state)))
+            .collect()
+    }
+
+    /// How often each state arises in a healthy robot, 1/h.
+    fn arises_1_h(&self) -> impl Iterator<Item = f64> {
+        self.states.iter().map(|state| match state.condition {
+            Condition::Fault { class, members } => class.arises_1_h / members,
+            Condition::Unknown { is_old: false } => self.parameters.unknown.arises_1_h,
+            _ => 0.0,
+        })
+    }
+
+    /// An alarm that has just risen.
+    fn start(&self) -> Vec<f64> {
+        let nominal = self.parameters.evidence.nominal_at_an_alarm;
+        let sum: f64 = self.arises_1_h().sum();
+        let share = |arises_1_h: f64| match sum > 0.0 {
+            true => (1.0 - nominal) * arises_1_h / sum,
+            false => 0.0,
+        };
+        let mut start: Vec<f64> = self.arises_1_h().map(share).collect();
+        start[0] = 1.0 - start.iter().sum::<f64>();
+        start
+    }
+
+    /// Distribution of the next state under an action that drives.
+    fn next(&self, action: &ActionParameters, from: usize) -> Result<Vec<f64>, ParameterError> {
+        let parameters = self.parameters;
+        let (epoch_s, unknown) = (parameters.epoch_s, parameters.unknown);
+        let condition = self.states[from].condition;
+        let mut next: Vec<f64> = match condition {
+            Condition::Done => return Ok(self.only(from)),
+            Condition::Nominal => self.arises_1_h().map(|rate| rate / 3600.0).collect(),
+            _ => vec![0.0; self.states.len()],
+        };
+        match condition {
+            Condition::Fault { class, .. } => next[0] = class.passes_1_s,
+            Condition::Unknown { is_old: false } => next[0] = unknown.passes_1_s,
+            _ => {}
+        }
+        let named = self
+            .states
+            .iter()
+            .filter(|s| matches!(s.condition, Condition::Fault { .. }));
+        let named = named.count() as f64;
+        for (rate_1_s, state) in next.iter_mut().zip(&self.states) {
+            *rate_1_s += match (condition, state.condition) {
+                (Condition::Fault { .. }, Condition::Several) => parameters.several.arises_1_s,
+                (Condition::Unknown { is_old: false }, Condition::Fault { .. }) => {
+                    unknown.named_1_s / named
+                }
+                (Condition::Unknown { is_old: false }, Condition::Unknown { is_old: true }) => {
+                    unknown.ages_1_s
+                }
+                (_, Condition::Done) => {
+                    parameters.task.speed_m_s * action.speed_scale / parameters.task.rest_m
+                }
+                _ => 0.0,
+            };
+        }
+        next[from] = 0.0;
+        next.iter_mut().for_each(|rate_1_s| *rate_1_s *= epoch_s);
+        let sum: f64 = next.iter().sum();
+        if sum > 1.0 {
+            return Err(ParameterError::Fast {
+                state: self.states[from].name.to_owned(),
+                sum,
+                epoch_s,
+            });
+        }
+        next[from] = 1.0 - sum;
+        Ok(next)
+    }
+
+    /// Distribution of the observation in a state: none, then every state's name. Nobody sees how
+    /// old what is unknown is; the end is always seen.
+    fn seen(&self, sees: f64, to: usize) -> Vec<f64> {
+        let done = self.states.len() - 1;
+        let mut seen = vec![0.0; self.states.len() + 1];
+        if to == done {
+            seen[done + 1] = 1.0;
+            return seen;
+        }
+        let new = |state: &State<'_>| {
+            !matches!(
+                state.condition,
+                Condition::Unknown { is_old: true } | Condition::Done
+            )
+        };
+        let is_unknown = |at: usize| matches!(self.states[at].condition, Condition::Unknown { .. });
+        let spoken: Vec<usize> = (0..done).filter(|at| new(&self.states[*at])).collect();
+        let wrong = sees * self.parameters.evidence.confused / (spoken.len() as f64 - 1.0).max(1.0);
+        for at in spoken {
+            let is_true = at == to || (is_unknown(at) && is_unknown(to));
+            seen[at + 1] = if is_true { sees } else { wrong };
+        }
+        seen[0] = 1.0 - seen.iter().sum::<f64>();
+        seen
+    }
+
+    /// Price of a step.
+    fn price(&self, action: &ActionParameters, condition: Condition<'_>) -> f64 {
+        let parameters = self.parameters;
+        let scale = action.speed_scale;
+        let answers = |class: &Fault| action.remedies.as_deref() == Some(class.leaves.as_str());
+        let (price_1_m, is_answered) = match condition {
+            Condition::Nominal | Condition::Done => (0.0, false),
+            Condition::Fault { class, .. } => match class.remedied_1_m.filter(|_| answers(class)) {
+                Some(remedied_1_m) => (remedied_1_m, true),
+                None => (class.price_1_m * scale, false),
+            },
+            Condition::Several => (parameters.several.price_1_m * scale, false),
+            Condition::Unknown { .. } => (parameters.unknown.price_1_m * scale, false),
+        };
+        let needless_1_m = if is_answered {
+            0.0
+        } else {
+            action.needless_1_m
+        };
+        let way_m = parameters.task.speed_m_s * scale * parameters.epoch_s;
+        (price_1_m + needless_1_m) * way_m + parameters.task.price_1_s * parameters.epoch_s
+    }
+}
+
+fn row(numbers: &[f64]) -> String {
+    let numbers: Vec<String> = numbers.iter().map(|value| number(*value)).collect();
+    numbers.join(" ")
+}
+
+/// A number to twelve significant digits, in plain notation.
+fn number(value: f64) -> String {
+    let rounded = format!("{value:.DIGITS$e}").parse::<f64>().unwrap_or(value);
+    // No "-0".
+    format!("{}", rounded + 0.0)
+}
+
+fn line(text: &mut String, content: &str) {
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "{content}");
+}

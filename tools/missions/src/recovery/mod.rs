@@ -1,0 +1,22 @@
+//! The model of what to do about faults, from the fault tree and a few parameters.
+//!
+//! States are nominal (`ND`), a leaf of the tree each or all in one (`FAULT`), two faults or more
+//! (`SEVERAL`), what nothing explains, new and old (`UNKNOWN`, `UNKNOWN_OLD`), and the end of the
+//! task (`DONE`). Rewards are what a healthy robot would not have paid, so that a robot with nothing
+//! wrong loses only time.
+//!
+//! - The task ends with the way: a robot that stands comes no nearer to its end. So the discount
+//!   need not stand for it, and may be near 1.
+//! - A call for help is one step, however long help takes: it mends everything for its price.
+//! - What is unknown is given a name at a rate, passes, or grows old; what is old does neither. So
+//!   how long to wait for a name is a matter of the model.
+//! - The observation of a step is what its evidence speaks for most: the state's name, or `none`.
+//!   Evidence depends on the action: a robot that stands shows nothing.
+//!
+//! [`generate`] writes the model in Cassandra's format.
+
+mod generator;
+mod parameters;
+
+pub use generator::{Leaf, generate};
+pub use parameters::{ActionParameters, ParameterError, Parameters};

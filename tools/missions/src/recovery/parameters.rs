@@ -1,0 +1,257 @@
+//! The parameter file of the recovery model.
+
+use serde::Deserialize;
+
+/// Everything that the model is made from, but for the fault tree. Prices are in units of the
+/// user's choice, the same for all.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Discount per step, 0 to below 1.
+    pub discount: f64,
+    /// Length of a step: `supervisor.epoch_ms`, in s.
+    pub epoch_s: f64,
+    /// What the robot has to do.
+    pub task: Task,
+    /// Help.
+    pub help: Help,
+    /// What the robot can do.
+    pub action: Vec<ActionParameters>,
+    /// Classes of leaves of the fault tree.
+    pub fault: Vec<Fault>,
+    /// Two faults or more.
+    pub several: Several,
+    /// What nothing explains.
+    pub unknown: Unknown,
+    /// What a step's evidence speaks for.
+    pub evidence: Evidence,
+}
+
+/// What the robot has to do.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Task {
+    /// Usual speed, m/s.
+    pub speed_m_s: f64,
+    /// Way to the end of a task, in the mean, m.
+    pub rest_m: f64,
+    /// Price of a second.
+    pub price_1_s: f64,
+}
+
+/// Help.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Help {
+    /// Name of the action.
+    pub action: String,
+    /// Price of a call.
+    pub price: f64,
+    /// Time until help has come, s.
+    pub wait_s: f64,
+}
+
+/// Something that the robot can do.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ActionParameters {
+    /// Its name.
+    pub name: String,
+    /// Share of the usual speed, 0 to 1.
+    pub speed_scale: f64,
+    /// Chance that a step's evidence speaks for the truth, 0 to 1.
+    pub sees: f64,
+    /// The class of faults that it answers, by its `leaves`.
+    pub remedies: Option<String>,
+    /// Price of a metre where there is none of these.
+    #[serde(default)]
+    pub needless_1_m: f64,
+}
+
+/// A class of leaves of the fault tree.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fault {
+    /// First word of the leaves' faults: `stuck` for `stuck:LF`. `*` is every leaf that no other
+    /// class has, all in one state.
+    pub leaves: String,
+    /// How often one of them arises, 1/h.
+    pub arises_1_h: f64,
+    /// How often a fault passes by itself, 1/s.
+    pub passes_1_s: f64,
+    /// Price of a metre at full speed; at less the less.
+    pub price_1_m: f64,
+    /// Price of a metre where it is answered, whatever the speed.
+    pub remedied_1_m: Option<f64>,
+}
+
+/// Two faults or more.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Several {
+    /// How often another fault joins one, 1/s.
+    pub arises_1_s: f64,
+    /// Price of a metre at full speed.
+    pub price_1_m: f64,
+}
+
+/// What nothing explains.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Unknown {
+    /// How often it arises, 1/h.
+    pub arises_1_h: f64,
+    /// How often a new one passes by itself, 1/s.
+    pub passes_1_s: f64,
+    /// Price of a metre at full speed.
+    pub price_1_m: f64,
+    /// How often a new one turns out to have a name, 1/s.
+    pub named_1_s: f64,
+    /// How often a new one grows old, 1/s.
+    pub ages_1_s: f64,
+}
+
+/// What a step's evidence speaks for.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Evidence {
+    /// Chance that it speaks for a wrong state, as a share of that for the true one.
+    pub confused: f64,
+    /// Chance that nothing is wrong where a policy is begun. A policy is solved for an alarm that
+    /// has just risen: the live belief is the identifier's from the first cycle on.
+    pub nominal_at_an_alarm: f64,
+}
+
+/// Why parameters were refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ParameterError {
+    /// A number is out of range.
+    #[error("{key} is {found}; allowed is {allowed}")]
+    Range {
+        /// Key in the file.
+        key: String,
+        /// The number.
+        found: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// A class of faults has no leaf.
+    #[error("fault '{0}': no leaf of the fault tree has such a fault")]
+    NoLeaf(String),
+    /// A leaf belongs to no class.
+    #[error("leaf '{leaf}' ({fault}) belongs to no [[fault]]; '*' takes all that are left")]
+    NoClass {
+        /// Name of the leaf.
+        leaf: String,
+        /// Its fault.
+        fault: String,
+    },
+    /// An action answers a class that is not there.
+    #[error("action '{action}' remedies '{class}', which is no [[fault]]")]
+    NoFault {
+        /// Name of the action.
+        action: String,
+        /// What it remedies.
+        class: String,
+    },
+    /// Rates are so large that a step may leave a state more than once.
+    #[error("the rates out of state {state} sum to {sum} in a step of {epoch_s} s; allowed is 1")]
+    Fast {
+        /// The state.
+        state: String,
+        /// The sum.
+        sum: f64,
+        /// Length of a step, s.
+        epoch_s: f64,
+    },
+}
+
+impl Parameters {
+    /// Checks ranges and names.
+    ///
+    /// # Errors
+    /// The first [`ParameterError`].
+    pub fn check(&self) -> Result<(), ParameterError> {
+        let within = |key: String, found: f64, is: bool, allowed: &'static str| match is {
+            true => Ok(()),
+            false => Err(ParameterError::Range {
+                key,
+                found,
+                allowed,
+            }),
+        };
+        let share =
+            |key: String, found: f64| within(key, found, (0.0..=1.0).contains(&found), "0 to 1");
+        let discount = self.discount;
+        let below_one = (0.0..1.0).contains(&discount);
+        within("discount".into(), discount, below_one, "0 to below 1")?;
+        for (key, found) in [
+            ("epoch_s", self.epoch_s),
+            ("task.speed_m_s", self.task.speed_m_s),
+            ("task.rest_m", self.task.rest_m),
+        ] {
+            let is = found.is_finite() && found > 0.0;
+            within(key.into(), found, is, "any finite number above 0")?;
+        }
+        for (key, found) in self.amounts() {
+            let is = found.is_finite() && found >= 0.0;
+            within(key, found, is, "any finite number from 0")?;
+        }
+        share("evidence.confused".into(), self.evidence.confused)?;
+        let nominal = self.evidence.nominal_at_an_alarm;
+        share("evidence.nominal_at_an_alarm".into(), nominal)?;
+        for action in &self.action {
+            share(
+                format!("action {}.speed_scale", action.name),
+                action.speed_scale,
+            )?;
+            // The wrong states have a share on top of the true one's.
+            let seen = action.sees * (1.0 + self.evidence.confused);
+            let key = format!("action {}.sees, with what is confused", action.name);
+            share(key, seen)?;
+            let class = action.remedies.as_deref();
+            let is_there = |class: &str| self.fault.iter().any(|fault| fault.leaves == class);
+            if let Some(class) = class.filter(|class| !is_there(class)) {
+                return Err(ParameterError::NoFault {
+                    action: action.name.clone(),
+                    class: class.to_owned(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Rates and prices.
+    fn amounts(&self) -> Vec<(String, f64)> {
+        let (several, unknown) = (self.several, self.unknown);
+        let mut amounts: Vec<(String, f64)> = [
+            ("task.price_1_s", self.task.price_1_s),
+            ("help.price", self.help.price),
+            ("help.wait_s", self.help.wait_s),
+            ("several.arises_1_s", several.arises_1_s),
+            ("several.price_1_m", several.price_1_m),
+            ("unknown.arises_1_h", unknown.arises_1_h),
+            ("unknown.passes_1_s", unknown.passes_1_s),
+            ("unknown.price_1_m", unknown.price_1_m),
+            ("unknown.named_1_s", unknown.named_1_s),
+            ("unknown.ages_1_s", unknown.ages_1_s),
+        ]
+        .map(|(key, found)| (key.to_owned(), found))
+        .to_vec();
+        for fault in &self.fault {
+            let key = |name: &str| format!("fault {}.{name}", fault.leaves);
+            amounts.push((key("arises_1_h"), fault.arises_1_h));
+            amounts.push((key("passes_1_s"), fault.passes_1_s));
+            amounts.push((key("price_1_m"), fault.price_1_m));
+            let remedied = fault.remedied_1_m.unwrap_or(fault.price_1_m);
+            amounts.push((key("remedied_1_m"), remedied));
+        }
+        for action in &self.action {
+            amounts.push((
+                format!("action {}.needless_1_m", action.name),
+                action.needless_1_m,
+            ));
+        }
+        amounts
+    }
+}

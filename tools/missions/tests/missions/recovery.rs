@@ -1,0 +1,206 @@
+//! The shipped recovery model: what its file holds, and what its policy does.
+
+use toml::Table;
+use vigil_missions::recovery::{Leaf, ParameterError, Parameters, generate};
+use vigil_pomdp::policy::Policy;
+use vigil_pomdp::policy_file::PolicyFile;
+use vigil_pomdp::{PointBased, Pomdp, QMdp, mdp};
+
+const MODEL: &str = include_str!("../../../../config/rover.pomdp");
+const PARAMETERS: &str = include_str!("../../../../config/recovery.toml");
+const TREE: &str = include_str!("../../../../config/trees/rover.toml");
+const POLICY: &[u8] = include_bytes!("../../../../config/rover.policy.json");
+
+fn parameters() -> Parameters {
+    toml::from_str(PARAMETERS).unwrap()
+}
+
+fn leaves() -> Vec<Leaf> {
+    let tree: Table = TREE.parse().unwrap();
+    let nodes = tree["node"].as_array().unwrap().iter();
+    let leaf = |node: &toml::Value| {
+        Some(Leaf {
+            fault: node.get("fault")?.as_str()?.to_owned(),
+            name: node["name"].as_str()?.to_owned(),
+        })
+    };
+    nodes.filter_map(leaf).collect()
+}
+
+fn model() -> Pomdp {
+    Pomdp::parse(MODEL).unwrap()
+}
+
+fn state(model: &Pomdp, name: &str) -> usize {
+    model.states().iter().position(|s| s == name).unwrap()
+}
+
+fn action(model: &Pomdp, name: &str) -> usize {
+    model.actions().iter().position(|a| a == name).unwrap()
+}
+
+/// A belief, by the names of its states.
+fn belief(model: &Pomdp, parts: &[(&str, f64)]) -> Vec<f64> {
+    let mut belief = vec![0.0; model.states().len()];
+    for (name, p) in parts {
+        belief[state(model, name)] = *p;
+    }
+    belief
+}
+
+#[test]
+fn the_file_is_what_its_parameters_generate() {
+    assert!(
+        generate(&parameters(), &leaves()).unwrap() == MODEL,
+        "run: vigil pomdp generate config/recovery.toml --tree config/trees/rover.toml --out \
+         config/rover.pomdp, and solve again"
+    );
+    assert!(model().warnings().is_empty());
+}
+
+#[test]
+fn actions_differ_in_more_than_what_a_step_costs() {
+    // Where actions change neither state nor evidence, Q - R is the same for all, and a policy is
+    // the choice of the next step's reward.
+    let model = model();
+    let solution = mdp::solve(&model).unwrap();
+    let nominal = state(&model, "ND");
+    let rest = |a: usize| solution.q_of(a)[nominal] - model.reward(nominal, a);
+    let [go, slow] = ["go_on", "slow_down"].map(|name| rest(action(&model, name)));
+    assert!(
+        go > slow + 0.01,
+        "{go} {slow}: the way is shorter after a fast step"
+    );
+    // Help mends everything in one step, and the rest is as healthy as it can be.
+    let help = action(&model, "call_for_help");
+    for name in ["LF_STUCK", "SEVERAL", "UNKNOWN_OLD"] {
+        assert_eq!(
+            model.successors(state(&model, name), help),
+            [(nominal, 1.0)]
+        );
+    }
+    // A robot that stands shows nothing.
+    let none = model
+        .observations()
+        .iter()
+        .position(|z| z == "none")
+        .unwrap();
+    let shown = model.likelihood(help, none);
+    let done = state(&model, "DONE");
+    assert!((0..done).all(|s| shown[s] == 1.0) && shown[done] == 0.0);
+}
+
+#[test]
+fn a_step_is_made_of_the_rates_and_prices_of_the_file() {
+    let (model, parameters) = (model(), parameters());
+    let (stuck, slow) = (state(&model, "RM_STUCK"), action(&model, "slow_down"));
+    let next = model.successors(stuck, slow);
+    let to = |name: &str| {
+        let found = next.iter().find(|(s, _)| *s == state(&model, name));
+        found.map_or(0.0, |(_, p)| *p)
+    };
+    // 0.02 /s and 0.002 /s in 0.1 s, and 1.1 cm of 9 m.
+    assert!((to("ND") - 0.002).abs() < 1e-12 && (to("SEVERAL") - 0.0002).abs() < 1e-12);
+    assert!((to("DONE") - 0.22 * 0.5 * 0.1 / 9.0).abs() < 1e-12);
+    // Half of 200 a metre for 1.1 cm, and a tenth of a second.
+    let price = |s: usize, a: &str| -model.reward(s, action(&model, a));
+    assert!((price(stuck, "slow_down") - (100.0 * 0.011 + 0.1)).abs() < 1e-9);
+    assert!((price(stuck, "compensate") - (10.0 * 0.0154 + 0.1)).abs() < 1e-9);
+    let encoder = state(&model, "LF_ENC");
+    assert!((price(encoder, "compensate") - ((75.0 * 0.7 + 100.0) * 0.0154 + 0.1)).abs() < 1e-9);
+    assert!((price(encoder, "call_for_help") - 330.0).abs() < 1e-9);
+    // Six wheels share the rate.
+    let start = model.start();
+    let sum = 0.4 + 0.35 + 0.25;
+    assert!((start[stuck] - 0.6 * parameters.fault[0].arises_1_h / sum / 6.0).abs() < 1e-12);
+}
+
+#[test]
+fn the_solved_policy_calls_where_qmdp_waits_for_ever() {
+    // Q-MDP believes that the next step tells everything, so that a robot that nobody understands
+    // creeps on; the solved policy knows what a step tells.
+    let model = model();
+    let file = PolicyFile::read(POLICY, &model).unwrap();
+    let mut solved = PointBased::new(&model, &file.vectors).unwrap();
+    let mut qmdp = QMdp::new(mdp::solve(&model).unwrap());
+    let mut values = vec![0.0; model.actions().len()];
+    let mut chosen = |policy: &mut dyn Policy, parts: &[(&str, f64)]| {
+        let choice = policy.evaluate(&belief(&model, parts), &mut values);
+        model.actions()[choice.action].clone()
+    };
+    let old = [("ND", 0.01), ("UNKNOWN_OLD", 0.99)];
+    assert_eq!(chosen(&mut qmdp, &old), "slow_down");
+    assert_eq!(chosen(&mut solved, &old), "call_for_help");
+    for (parts, wanted) in [
+        (&[("ND", 1.0)][..], "go_on"),
+        (&[("RM_STUCK", 1.0)], "compensate"),
+        (&[("LF_ENC", 1.0)], "ignore_encoder"),
+        (&[("SEVERAL", 1.0)], "call_for_help"),
+        (&[("ND", 0.5), ("UNKNOWN", 0.5)], "slow_down"),
+    ] {
+        assert_eq!(chosen(&mut solved, parts), wanted, "{parts:?}");
+    }
+    // Bounds are of the start belief.
+    assert!(file.lower <= file.upper.unwrap() && file.upper.unwrap() - file.lower <= 2.0);
+}
+
+#[test]
+fn a_robot_of_any_faults_has_one_state_for_them() {
+    let mut parameters = parameters();
+    parameters.fault.truncate(1);
+    parameters.fault[0].leaves = "*".to_owned();
+    for action in &mut parameters.action {
+        action.remedies = None;
+    }
+    let model = Pomdp::parse(&generate(&parameters, &[]).unwrap()).unwrap();
+    let states = ["ND", "FAULT", "SEVERAL", "UNKNOWN", "UNKNOWN_OLD", "DONE"];
+    assert_eq!(model.states(), states);
+    assert!(model.warnings().is_empty());
+}
+
+#[test]
+fn parameters_that_mean_nothing_are_named() {
+    let refused = |change: fn(&mut Parameters)| {
+        let mut parameters = parameters();
+        change(&mut parameters);
+        generate(&parameters, &leaves()).unwrap_err()
+    };
+    let text = |change| refused(change).to_string();
+    assert_eq!(
+        text(|p| p.discount = 1.0),
+        "discount is 1; allowed is 0 to below 1"
+    );
+    assert_eq!(
+        text(|p| p.action[1].speed_scale = f64::NAN),
+        "action slow_down.speed_scale is NaN; allowed is 0 to 1"
+    );
+    assert_eq!(
+        text(|p| p.fault[0].price_1_m = -1.0),
+        "fault stuck.price_1_m is -1; allowed is any finite number from 0"
+    );
+    assert_eq!(
+        refused(|p| p.fault[0].leaves = "tyre".to_owned()),
+        ParameterError::NoFault {
+            action: "compensate".to_owned(),
+            class: "stuck".to_owned(),
+        }
+    );
+    assert_eq!(
+        text(|p| {
+            p.fault.truncate(1);
+            p.action[3].remedies = None;
+        }),
+        "leaf 'LF_ENC' (encoder:LF) belongs to no [[fault]]; '*' takes all that are left"
+    );
+    assert_eq!(
+        text(|p| {
+            let mut servo = p.fault[0].clone();
+            servo.leaves = "servo".to_owned();
+            p.fault.push(servo);
+        }),
+        "fault 'servo': no leaf of the fault tree has such a fault"
+    );
+    assert!(
+        text(|p| p.unknown.ages_1_s = 20.0).starts_with("the rates out of state UNKNOWN sum to")
+    );
+}
