@@ -11,8 +11,8 @@ pub(super) const WHEELS: [&str; 6] = ["LF", "LM", "LR", "RF", "RM", "RR"];
 const STEERED: [usize; 4] = [0, 2, 3, 5];
 /// How an encoder breaks.
 const BROKEN: [&str; 3] = ["zero", "frozen", "noise"];
-/// What no model contains; `W` stands for a wheel, `S` for a steered one. Slopes and soils are none:
-/// the robot's tolerances declare them healthy.
+/// What no model contains; `W` stands for a wheel, `S` for a steered one. Slopes and soils are
+/// none of it: the robot's tolerances declare them healthy.
 const UNMODELLED: [&str; 8] = [
     "steer-offset-hidden:S:0.2",
     "steer-offset-hidden:S:-0.3",

@@ -56,7 +56,7 @@ struct Needed {
 impl ActionHysteresis {
     /// Going on, once left, must be best for `hold_epochs`, and [`HOLD_EPOCHS`] at least.
     pub(crate) fn new(hold_epochs: u32) -> Self {
-        Self::of(Needed {
+        Self::needing(Needed {
             help: HELP_EPOCHS,
             faster: HOLD_EPOCHS,
             going_on: hold_epochs.max(HOLD_EPOCHS),
@@ -65,14 +65,14 @@ impl ActionHysteresis {
 
     /// The best action is taken at once: the decision model knows what it is to wait for.
     pub(crate) const fn at_once() -> Self {
-        Self::of(Needed {
+        Self::needing(Needed {
             help: 0,
             faster: 0,
             going_on: 0,
         })
     }
 
-    const fn of(needed: Needed) -> Self {
+    const fn needing(needed: Needed) -> Self {
         Self {
             needed,
             has_left: false,
@@ -85,7 +85,7 @@ impl ActionHysteresis {
 
     /// Forgets everything: a new run, or whoever has helped.
     pub(crate) fn reset(&mut self) {
-        *self = Self::of(self.needed);
+        *self = Self::needing(self.needed);
     }
 
     /// The call for help that stands.

@@ -65,61 +65,65 @@ pub fn generate(parameters: &Parameters, leaves: &[Leaf]) -> Result<String, Para
         &format!("observations: none {}", names.join(" ")),
     );
     line(&mut text, &format!("start: {}", row(&model.start())));
+    write_transitions(&mut text, &model)?;
+    write_observations(&mut text, &model);
+    write_rewards(&mut text, &model);
+    Ok(text)
+}
+
+fn write_transitions(text: &mut String, model: &Model<'_>) -> Result<(), ParameterError> {
     line(
-        &mut text,
+        text,
         "\n# What arises, joins, is named, grows old, passes, ends.",
     );
-    for action in &parameters.action {
-        for (from, name) in names.iter().enumerate() {
+    for action in &model.parameters.action {
+        for (from, state) in model.states.iter().enumerate() {
             let next = row(&model.next(action, from)?);
-            line(&mut text, &format!("T: {} : {name}\n{next}", action.name));
-        }
-    }
-    let help = &parameters.help.action;
-    line(
-        &mut text,
-        &format!("T: {help} : *\n{}", row(&model.only(0))),
-    );
-    line(
-        &mut text,
-        &format!("T: {help} : DONE\n{}", row(&model.only(names.len() - 1))),
-    );
-    line(
-        &mut text,
-        "\n# What the evidence of a step speaks for most.",
-    );
-    for action in &parameters.action {
-        for (to, name) in names.iter().enumerate() {
-            let seen = model.seen(action.sees, to);
             line(
-                &mut text,
-                &format!("O: {} : {name}\n{}", action.name, row(&seen)),
+                text,
+                &format!("T: {} : {}\n{next}", action.name, state.name),
             );
         }
     }
-    for (to, name) in names.iter().enumerate() {
-        line(
-            &mut text,
-            &format!("O: {help} : {name}\n{}", row(&model.seen(0.0, to))),
-        );
-    }
-    line(&mut text, "\n# What a step costs.");
-    for (state, name) in model.states.iter().zip(&names) {
-        if matches!(state.condition, Condition::Done) {
-            continue;
+    let help = &model.parameters.help.action;
+    let [nominal, done] = [0, model.states.len() - 1].map(|state| row(&model.only(state)));
+    line(text, &format!("T: {help} : *\n{nominal}"));
+    line(text, &format!("T: {help} : DONE\n{done}"));
+    Ok(())
+}
+
+fn write_observations(text: &mut String, model: &Model<'_>) {
+    line(text, "\n# What the evidence of a step speaks for most.");
+    let actions = model.parameters.action.iter();
+    let actions = actions.map(|action| (action.name.as_str(), action.sees));
+    for (action, sees) in actions.chain([(model.parameters.help.action.as_str(), 0.0)]) {
+        for (to, state) in model.states.iter().enumerate() {
+            let seen = row(&model.seen(sees, to));
+            line(text, &format!("O: {action} : {}\n{seen}", state.name));
         }
-        for action in &parameters.action {
-            let price = number(-model.price(action, state.condition));
+    }
+}
+
+fn write_rewards(text: &mut String, model: &Model<'_>) {
+    line(text, "\n# What a step costs.");
+    let Parameters {
+        action, help, task, ..
+    } = model.parameters;
+    let helped = help.price + task.price_1_s * help.wait_s;
+    let lasts = |state: &&State<'_>| !matches!(state.condition, Condition::Done);
+    for state in model.states.iter().filter(lasts) {
+        let driven = action.iter().map(|action| {
+            let price = model.price(action, state.condition);
+            (action.name.as_str(), price)
+        });
+        for (action, price) in driven.chain([(help.action.as_str(), helped)]) {
+            let price = number(-price);
             line(
-                &mut text,
-                &format!("R: {} : {name} : * : * {price}", action.name),
+                text,
+                &format!("R: {action} : {} : * : * {price}", state.name),
             );
         }
-        let waits = parameters.task.price_1_s * parameters.help.wait_s;
-        let price = number(-parameters.help.price - waits);
-        line(&mut text, &format!("R: {help} : {name} : * : * {price}"));
     }
-    Ok(text)
 }
 
 /// States in the model's order: nominal first, the end last.

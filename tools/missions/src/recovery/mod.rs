@@ -2,8 +2,8 @@
 //!
 //! States are nominal (`ND`), a leaf of the tree each or all in one (`FAULT`), two faults or more
 //! (`SEVERAL`), what nothing explains, new and old (`UNKNOWN`, `UNKNOWN_OLD`), and the end of the
-//! task (`DONE`). Rewards are what a healthy robot would not have paid, so that a robot with nothing
-//! wrong loses only time.
+//! task (`DONE`). Rewards are what a healthy robot would not have paid, so that a robot with
+//! nothing wrong loses only time.
 //!
 //! - The task ends with the way: a robot that stands comes no nearer to its end. So the discount
 //!   need not stand for it, and may be near 1.

@@ -1,4 +1,5 @@
-//! `vigil pomdp generate`: a model from its parameters: of navigation, or of what to do about faults.
+//! `vigil pomdp generate`: a model from its parameters, of navigation or of what to do about
+//! faults.
 
 use std::fmt::Display;
 use std::fs;
