@@ -120,7 +120,7 @@ const BAD: [(&str, &str, &str, &[&str]); 13] = [
     ),
     (
         "rover.toml",
-        "slow_down = { kind",
+        "stop = { kind",
         "halt = { kind",
         &["[supervisor.actions]", "'halt'"],
     ),

@@ -215,13 +215,15 @@ impl Model<'_> {
         start
     }
 
-    /// Distribution of the next state under an action that drives.
+    /// Distribution of the next state. While a robot stands, nothing is known to happen.
     fn next(&self, action: &ActionParameters, from: usize) -> Result<Vec<f64>, ParameterError> {
         let parameters = self.parameters;
         let (epoch_s, unknown) = (parameters.epoch_s, parameters.unknown);
         let condition = self.states[from].condition;
+        if matches!(condition, Condition::Done) || action.speed_scale == 0.0 {
+            return Ok(self.only(from));
+        }
         let mut next: Vec<f64> = match condition {
-            Condition::Done => return Ok(self.only(from)),
             Condition::Nominal => self.arises_1_h().map(|rate| rate / 3600.0).collect(),
             _ => vec![0.0; self.states.len()],
         };

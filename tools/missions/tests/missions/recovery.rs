@@ -72,12 +72,14 @@ fn actions_differ_in_more_than_what_a_step_costs() {
         "{go} {slow}: the way is shorter after a fast step"
     );
     // Help mends everything in one step, and the rest is as healthy as it can be.
-    let help = action(&model, "call_for_help");
+    let (help, stop) = (action(&model, "call_for_help"), action(&model, "stop"));
     for name in ["LF_STUCK", "SEVERAL", "UNKNOWN_OLD"] {
         assert_eq!(
             model.successors(state(&model, name), help),
             [(nominal, 1.0)]
         );
+        let stands = state(&model, name);
+        assert_eq!(model.successors(stands, stop), [(stands, 1.0)]);
     }
     // A robot that stands shows nothing.
     let none = model
@@ -85,6 +87,7 @@ fn actions_differ_in_more_than_what_a_step_costs() {
         .iter()
         .position(|z| z == "none")
         .unwrap();
+    assert_eq!(model.likelihood(help, none), model.likelihood(stop, none));
     let shown = model.likelihood(help, none);
     let done = state(&model, "DONE");
     assert!((0..done).all(|s| shown[s] == 1.0) && shown[done] == 0.0);
@@ -188,7 +191,7 @@ fn parameters_that_mean_nothing_are_named() {
     assert_eq!(
         text(|p| {
             p.fault.truncate(1);
-            p.action[3].remedies = None;
+            p.action[4].remedies = None;
         }),
         "leaf 'LF_ENC' (encoder:LF) belongs to no [[fault]]; '*' takes all that are left"
     );
