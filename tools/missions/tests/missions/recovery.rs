@@ -121,7 +121,7 @@ fn a_step_is_made_of_the_rates_and_prices_of_the_file() {
 #[test]
 fn the_solved_policy_calls_where_qmdp_waits_for_ever() {
     // Q-MDP believes that the next step tells everything, so that a robot that nobody understands
-    // creeps on; the solved policy knows what a step tells.
+    // stands and waits; the solved policy knows that a robot that stands shows nothing.
     let model = model();
     let file = PolicyFile::read(POLICY, &model).unwrap();
     let mut solved = PointBased::new(&model, &file.vectors).unwrap();
@@ -132,7 +132,7 @@ fn the_solved_policy_calls_where_qmdp_waits_for_ever() {
         model.actions()[choice.action].clone()
     };
     let old = [("ND", 0.01), ("UNKNOWN_OLD", 0.99)];
-    assert_eq!(chosen(&mut qmdp, &old), "slow_down");
+    assert_eq!(chosen(&mut qmdp, &old), "stop");
     assert_eq!(chosen(&mut solved, &old), "call_for_help");
     for (parts, wanted) in [
         (&[("ND", 1.0)][..], "go_on"),
