@@ -291,7 +291,7 @@ mod tests {
             let severities = breakdown.steps.iter().map(|step| step.present[0].severity);
             assert!(severities.clone().is_sorted());
             assert_eq!(severities.clone().next(), Some(0.0));
-            assert_eq!(severities.last(), Some(1.0));
+            assert_eq!(severities.clone().next_back(), Some(1.0));
             causes.push(matches!(breakdown.expected[0].cause, Cause::Unmodelled));
         }
         assert!(causes.contains(&true) && causes.contains(&false));
