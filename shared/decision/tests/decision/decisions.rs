@@ -298,17 +298,17 @@ fn what_does_not_fit_is_named() {
     assert!(missing.contains("no state 'LR_ENC'"), "{missing}");
     let mut fewer = settings.clone();
     fewer.actions.remove("stop");
-    assert!(message(&source, &fewer, &all).contains("action 'stop'"));
+    assert!(message(source, &fewer, &all).contains("action 'stop'"));
     let mut more = settings.clone();
     more.actions
         .insert("fly".into(), settings.actions["stop"].clone());
-    assert!(message(&source, &more, &all).contains("'fly'"));
+    assert!(message(source, &more, &all).contains("'fly'"));
     let mut other = settings.clone();
     other.policy = "luck".into();
-    assert!(message(&source, &other, &all).contains("'luck'"));
+    assert!(message(source, &other, &all).contains("'luck'"));
     let mut spoilt = all.clone();
     spoilt[4].curvature_gain = f64::NAN;
-    assert!(message(&source, &settings, &spoilt).contains("wheel 4"));
+    assert!(message(source, &settings, &spoilt).contains("wheel 4"));
     let large = "discount: 0.9\nstates: 65\nactions: 2\nobservations: 1\nT: * identity\n\
                  O: * uniform\n";
     assert!(message(large, &settings, &all).contains("65 states"));
