@@ -116,7 +116,8 @@ impl<'a> Commander<'a> {
     }
 
     /// The action block of a kind, as the supervisor would write it.
-    fn set_action(&mut self, RuleOutput { kind, wheel }: RuleOutput) {
+    fn set_action(&mut self, output: RuleOutput) {
+        let RuleOutput { kind, wheel } = output;
         let steers = wheel.filter(|_| kind == RecoveryKind::Compensate);
         let straight = (1.0, 0.0);
         let (gain, offset) = steers.map_or(straight, |w| self.shipped.setup.model.compensation(w));
@@ -124,22 +125,12 @@ impl<'a> Commander<'a> {
             decision_seq: 1,
             kind: kind as u32,
             wheel: wheel.map_or(u32::MAX, |wheel| wheel as u32),
-            speed_scale: speed_scale(kind),
+            speed_scale: output.speed_scale(),
             curvature_gain: gain,
             curvature_offset: offset,
             valid_until_ns: u64::MAX,
             ..Action::default()
         };
-    }
-}
-
-/// Share of the planned speed, as Vigil's actions have it by default.
-const fn speed_scale(kind: RecoveryKind) -> f64 {
-    match kind {
-        RecoveryKind::GoOn | RecoveryKind::IgnoreEncoder => 1.0,
-        RecoveryKind::Compensate => 0.7,
-        RecoveryKind::SlowDown => 0.5,
-        _ => 0.0,
     }
 }
 

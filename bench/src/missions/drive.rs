@@ -125,7 +125,7 @@ impl<'a> Field<'a> {
 ///
 /// # Errors
 /// A world or commander that cannot be made.
-pub(super) fn ride(shipped: &ShippedGraph, plan: &Plan, arm: Arm) -> Result<Score, Box<dyn Error>> {
+fn ride(shipped: &ShippedGraph, plan: &Plan, arm: Arm) -> Result<Score, Box<dyn Error>> {
     let rate_hz = shipped.setup.file.graph.rate_hz;
     let (dt_s, period_ns) = (1.0 / rate_hz, (1e9 / rate_hz).round() as u64);
     let prices = &shipped.missions.prices;

@@ -1,7 +1,10 @@
 //! Kinds of missions, by what breaks.
 
+use serde::Deserialize;
+
 /// Kind of a mission.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// Nothing breaks.
     Nothing,

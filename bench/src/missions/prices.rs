@@ -1,5 +1,6 @@
 //! What a mission is worth: `bench/missions.toml`.
 
+use std::collections::BTreeMap;
 use std::error::Error;
 
 use serde::Deserialize;
@@ -14,7 +15,7 @@ pub struct MissionFile {
     /// Prices, in points.
     pub prices: Prices,
     /// Share of each kind of missions.
-    shares: Shares,
+    shares: BTreeMap<Kind, f64>,
     /// The rules that the sweep found.
     pub rules: Rules,
 }
@@ -63,18 +64,6 @@ pub struct NeedlessPrices {
     pub ignoring: f64,
 }
 
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Shares {
-    nothing: f64,
-    stuck: f64,
-    encoder: f64,
-    two: f64,
-    unmodelled: f64,
-    intermittent: f64,
-    growing: f64,
-}
-
 impl MissionFile {
     /// Reads it.
     ///
@@ -93,25 +82,12 @@ impl MissionFile {
     /// Share of a kind where the odds of any fault are `odds` times those of the file.
     #[must_use]
     pub fn share(&self, kind: Kind, odds: f64) -> f64 {
-        let Shares {
-            nothing,
-            stuck,
-            encoder,
-            two,
-            unmodelled,
-            intermittent,
-            growing,
-        } = self.shares;
+        let stated = |kind| self.shares.get(&kind).copied().unwrap_or(0.0);
+        let nothing = stated(Kind::Nothing);
         let healthy = nothing / (nothing + odds * (1.0 - nothing));
-        let faulty = |share: f64| (1.0 - healthy) * share / (1.0 - nothing);
         match kind {
             Kind::Nothing => healthy,
-            Kind::Stuck => faulty(stuck),
-            Kind::Encoder => faulty(encoder),
-            Kind::Two => faulty(two),
-            Kind::Unmodelled => faulty(unmodelled),
-            Kind::Intermittent => faulty(intermittent),
-            Kind::Growing => faulty(growing),
+            _ => (1.0 - healthy) * stated(kind) / (1.0 - nothing),
         }
     }
 }

@@ -29,6 +29,19 @@ pub struct RuleInput {
     pub several: bool,
 }
 
+#[cfg(test)]
+impl RuleInput {
+    /// An alarm, or none, of which nothing is known.
+    const fn of_alarm(alarm: bool) -> Self {
+        Self {
+            alarm,
+            explanation: None,
+            p: 1.0,
+            several: false,
+        }
+    }
+}
+
 /// What the rules say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RuleOutput {
@@ -54,6 +67,17 @@ impl RuleOutput {
             Cause::Unmodelled => (RecoveryKind::SlowDown, None),
         };
         Self { kind, wheel }
+    }
+
+    /// Share of the planned speed, as Vigil's actions have it by default.
+    #[must_use]
+    pub const fn speed_scale(self) -> f64 {
+        match self.kind {
+            RecoveryKind::GoOn | RecoveryKind::IgnoreEncoder => 1.0,
+            RecoveryKind::Compensate => 0.7,
+            RecoveryKind::SlowDown => 0.5,
+            _ => 0.0,
+        }
     }
 }
 

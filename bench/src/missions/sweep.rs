@@ -5,12 +5,13 @@ use std::error::Error;
 use serde_json::{Value, json};
 use vigil_evaluation::parallel::in_parallel;
 
+use super::ShippedGraph;
 use super::commander::Arm;
-use super::drive::ride;
-use super::kind::Kind;
+use super::drive::{Mission, drive};
 use super::plan::Plan;
 use super::rules::Rule;
-use super::{MissionFile, ShippedGraph};
+use super::score::POINTS;
+use super::table::Table;
 
 /// Rounds over all settings; fewer if one changes nothing.
 const ROUNDS: u32 = 4;
@@ -66,9 +67,12 @@ pub fn tune(
             for rule in tuned.rule.varied(dimension) {
                 let points = match tuned.tried.iter().find(|(tried, _)| *tried == rule) {
                     Some((_, points)) => *points,
-                    None => points(shipped, plans, rule)?,
+                    None => {
+                        let points = points(shipped, plans, rule)?;
+                        tuned.tried.push((rule, points));
+                        points
+                    }
                 };
-                tuned.tried.push((rule, points));
                 if points > tuned.points {
                     (tuned.rule, tuned.points) = (rule, points);
                 }
@@ -89,36 +93,15 @@ pub fn tune(
 
 /// Mean points of a rule, weighed by the shares of the kinds.
 fn points(shipped: &ShippedGraph, plans: &[Plan], rule: Rule) -> Result<f64, Box<dyn Error>> {
-    let driven = in_parallel(plans, |plan| {
-        let score = ride(shipped, plan, Arm::Rule(rule)).map_err(|e| e.to_string())?;
-        Ok::<_, String>((plan.kind, score.points))
-    });
-    let driven: Vec<(Kind, f64)> = driven.into_iter().collect::<Result<_, _>>()?;
-    Ok(weighed(&shipped.missions, &driven))
-}
-
-fn weighed(file: &MissionFile, driven: &[(Kind, f64)]) -> f64 {
-    let mean = |kind: Kind| {
-        let here = driven.iter().filter(|(other, _)| *other == kind);
-        let (count, sum) = here.fold((0.0, 0.0), |(n, sum), (_, points)| (n + 1.0, sum + points));
-        sum / f64::max(count, 1.0)
+    let arms = [Arm::Rule(rule)];
+    let ride = |plan: &Plan| drive(shipped, plan, &arms).map_err(|e| e.to_string());
+    let missions: Result<Vec<Mission>, String> = in_parallel(plans, ride).into_iter().collect();
+    let table = Table {
+        file: &shipped.missions,
+        arms: &arms,
+        missions: &missions?,
     };
-    let parts = Kind::ALL
-        .iter()
-        .map(|kind| file.share(*kind, 1.0) * mean(*kind));
-    parts.sum()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn kinds_weigh_by_their_shares_however_many_missions_they_have() {
-        let file = MissionFile::read().unwrap();
-        let mut driven: Vec<(Kind, f64)> = Kind::ALL.map(|kind| (kind, 100.0)).to_vec();
-        assert!((weighed(&file, &driven) - 100.0).abs() < 1e-9);
-        driven.extend([(Kind::Nothing, 200.0), (Kind::Nothing, 300.0)]);
-        assert!((weighed(&file, &driven) - 120.0).abs() < 1e-9);
-    }
+    Ok(table
+        .over_kinds(1.0, |kind| table.mean(kind, 0, POINTS))
+        .mean)
 }

@@ -142,3 +142,36 @@ impl Table<'_> {
         document
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::missions::{POINTS, Plan};
+
+    #[test]
+    fn kinds_weigh_by_their_shares_however_many_missions_they_have() {
+        let file = MissionFile::read().unwrap();
+        let mission = |kind, points| Mission {
+            plan: Plan::new(kind, 1),
+            scores: vec![Score {
+                points,
+                ..Score::default()
+            }],
+        };
+        let mut missions = Kind::ALL.map(|kind| mission(kind, 100.0)).to_vec();
+        let weighed = |missions: &[Mission]| {
+            let arms = [Arm::Vigil];
+            let table = Table {
+                file: &file,
+                arms: &arms,
+                missions,
+            };
+            table
+                .over_kinds(1.0, |kind| table.mean(kind, 0, POINTS))
+                .mean
+        };
+        assert!((weighed(&missions) - 100.0).abs() < 1e-9);
+        missions.extend([200.0, 300.0].map(|points| mission(Kind::Nothing, points)));
+        assert!((weighed(&missions) - 120.0).abs() < 1e-9);
+    }
+}

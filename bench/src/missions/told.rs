@@ -8,8 +8,6 @@ use super::prices::Prices;
 use super::rules::RuleOutput;
 use super::score::price_1_m;
 
-/// Share of the planned speed under a remedy, roughly: for what time costs.
-const REMEDY_SPEED: f64 = 0.7;
 /// Planned speed in the mean, m/s: for what time costs.
 const SPEED_M_S: f64 = 0.22;
 
@@ -41,14 +39,12 @@ pub(super) fn best(prices: &Prices, knowledge: &Knowledge<'_>) -> RuleOutput {
 /// What costs least over the rest of the path, beyond what a healthy rover would cost, and that
 /// price.
 fn cheapest(prices: &Prices, faults: &[PresentFault], rest_m: f64) -> (RuleOutput, f64) {
-    let plain = [(RecoveryKind::GoOn, 1.0), (RecoveryKind::SlowDown, 0.5)];
-    let plain = plain.map(|(kind, speed)| (RuleOutput::plain(kind), speed));
-    let remedies = faults.iter().filter_map(|fault| match fault.cause {
-        Cause::Unmodelled => None,
-        Cause::Stuck(_) => Some((RuleOutput::remedy(fault.cause), REMEDY_SPEED)),
-        Cause::Encoder(_) => Some((RuleOutput::remedy(fault.cause), 1.0)),
-    });
-    let priced = plain.into_iter().chain(remedies).map(|(output, speed)| {
+    let plain = [RecoveryKind::GoOn, RecoveryKind::SlowDown].map(RuleOutput::plain);
+    let has_remedy = |fault: &&PresentFault| fault.cause != Cause::Unmodelled;
+    let remedies = faults.iter().filter(has_remedy);
+    let remedies = remedies.map(|fault| RuleOutput::remedy(fault.cause));
+    let priced = plain.into_iter().chain(remedies).map(|output| {
+        let speed = output.speed_scale();
         let waits_s = rest_m / SPEED_M_S * (1.0 / speed - 1.0);
         let price = price_1_m(prices, faults, output, speed) * rest_m + prices.time_1_s * waits_s;
         (output, price)

@@ -3,6 +3,7 @@
 //! [`recovery`] that of what to do about faults.
 
 pub mod learning;
+mod model_text;
 pub mod navigation;
 pub mod recovery;
 pub mod simulation;

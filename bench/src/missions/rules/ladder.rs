@@ -104,15 +104,7 @@ mod tests {
             quiet_s: 0.15,
         };
         let mut ladder = Ladder::new(settings);
-        let mut say = |alarm| {
-            let input = RuleInput {
-                alarm,
-                explanation: None,
-                p: 1.0,
-                several: false,
-            };
-            ladder.answer(input, 0.1).kind
-        };
+        let mut say = |alarm| ladder.answer(RuleInput::of_alarm(alarm), 0.1).kind;
         use RecoveryKind::{CallForHelp, GoOn, SlowDown, Stop};
         let said = [false, true, true, false, false, true, true, true, true].map(&mut say);
         let wanted = [

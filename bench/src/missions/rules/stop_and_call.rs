@@ -65,15 +65,7 @@ mod tests {
     #[test]
     fn an_alarm_that_stays_is_answered_by_a_call() {
         let mut rule = StopAndCall::new(StopAndCallSettings { wait_s: 0.25 });
-        let mut say = |alarm| {
-            let input = RuleInput {
-                alarm,
-                explanation: None,
-                p: 1.0,
-                several: false,
-            };
-            rule.answer(input, 0.1).kind
-        };
+        let mut say = |alarm| rule.answer(RuleInput::of_alarm(alarm), 0.1).kind;
         use RecoveryKind::{CallForHelp, GoOn, Stop};
         let said = [false, true, true, false, true, true, true, true, false].map(&mut say);
         let wanted = [

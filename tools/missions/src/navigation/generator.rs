@@ -1,8 +1,7 @@
 //! From parameters to the text of a `.pomdp` file.
 
-use std::fmt::Write;
-
 use super::{ACTIONS, ParameterError, Parameters, STATES};
+use crate::model_text::{line, number};
 
 const HEAD: &str = "\
 # What a robot does about exceptions of its navigation: the model of Verma, Fernandez and Simmons
@@ -17,9 +16,6 @@ const HEAD: &str = "\
 # EPS error in position (stopped), EPM the same (moving), LD loop, SD spinning, BO blockage
 # overtaken, ALT alternative path, NNA no alternative that can be navigated.
 ";
-
-/// The largest number of decimals of a probability; its rows are exact to better than 1e-11.
-const DIGITS: usize = 11;
 
 /// Writes the model, in Cassandra's format.
 ///
@@ -192,16 +188,4 @@ fn rewards(text: &mut String, parameters: &Parameters) {
     for (action, price) in ACTIONS[1..].iter().zip(table) {
         line(text, &format!("R: {action} : * : * : * {}", number(-price)));
     }
-}
-
-/// A number to twelve significant digits, in plain notation.
-fn number(value: f64) -> String {
-    let rounded = format!("{value:.DIGITS$e}").parse::<f64>().unwrap_or(value);
-    // No "-0".
-    format!("{}", rounded + 0.0)
-}
-
-fn line(text: &mut String, content: &str) {
-    // Writing to a string cannot fail.
-    let _ = writeln!(text, "{content}");
 }

@@ -1,14 +1,12 @@
 //! From parameters and leaves to a `.pomdp` text.
 
-use std::fmt::Write as _;
+use crate::model_text::{line, number};
 
 use super::parameters::{ActionParameters, Fault, ParameterError, Parameters};
 
 /// Class of every leaf that no other class has, and the name of its state.
 const REST: &str = "*";
 const FAULT: &str = "FAULT";
-/// Significant digits after the first.
-const DIGITS: usize = 11;
 
 const HEAD: &str = "\
 # What to do about a fault. Generated: change the parameters, not this file.
@@ -141,32 +139,25 @@ fn states<'a>(
             fault: leaf.fault.clone(),
         });
     }
-    let members = |class: &Fault| {
-        leaves
-            .iter()
-            .filter(|leaf| word(leaf) == class.leaves)
-            .count()
-    };
     let mut states = vec![State {
         name: "ND",
         condition: Condition::Nominal,
     }];
     for class in classes {
-        if class.leaves != REST && members(class) == 0 {
-            return Err(ParameterError::NoLeaf(class.leaves.clone()));
-        }
         let fault = |name, members| State {
             name,
             condition: Condition::Fault { class, members },
         };
-        match class.leaves == REST {
-            true => states.push(fault(FAULT, 1.0)),
-            false => {
-                let own = leaves.iter().filter(|leaf| word(leaf) == class.leaves);
-                let count = members(class) as f64;
-                states.extend(own.map(|leaf| fault(leaf.name.as_str(), count)));
-            }
+        if class.leaves == REST {
+            states.push(fault(FAULT, 1.0));
+            continue;
         }
+        let own = leaves.iter().filter(|leaf| word(leaf) == class.leaves);
+        let members = own.clone().count();
+        if members == 0 {
+            return Err(ParameterError::NoLeaf(class.leaves.clone()));
+        }
+        states.extend(own.map(|leaf| fault(leaf.name.as_str(), members as f64)));
     }
     states.extend(
         [
@@ -217,43 +208,18 @@ impl Model<'_> {
 
     /// Distribution of the next state. While a robot stands, nothing is known to happen.
     fn next(&self, action: &ActionParameters, from: usize) -> Result<Vec<f64>, ParameterError> {
-        let parameters = self.parameters;
-        let (epoch_s, unknown) = (parameters.epoch_s, parameters.unknown);
+        let epoch_s = self.parameters.epoch_s;
         let condition = self.states[from].condition;
         if matches!(condition, Condition::Done) || action.speed_scale == 0.0 {
             return Ok(self.only(from));
         }
-        let mut next: Vec<f64> = match condition {
-            Condition::Nominal => self.arises_1_h().map(|rate| rate / 3600.0).collect(),
-            _ => vec![0.0; self.states.len()],
-        };
-        match condition {
-            Condition::Fault { class, .. } => next[0] = class.passes_1_s,
-            Condition::Unknown { is_old: false } => next[0] = unknown.passes_1_s,
-            _ => {}
-        }
-        let named = self
-            .states
-            .iter()
-            .filter(|s| matches!(s.condition, Condition::Fault { .. }));
-        let named = named.count() as f64;
-        for (rate_1_s, state) in next.iter_mut().zip(&self.states) {
-            *rate_1_s += match (condition, state.condition) {
-                (Condition::Fault { .. }, Condition::Several) => parameters.several.arises_1_s,
-                (Condition::Unknown { is_old: false }, Condition::Fault { .. }) => {
-                    unknown.named_1_s / named
-                }
-                (Condition::Unknown { is_old: false }, Condition::Unknown { is_old: true }) => {
-                    unknown.ages_1_s
-                }
-                (_, Condition::Done) => {
-                    parameters.task.speed_m_s * action.speed_scale / parameters.task.rest_m
-                }
-                _ => 0.0,
-            };
-        }
+        let rates_1_s = self.states.iter().zip(self.arises_1_h());
+        let rates_1_s = rates_1_s.map(|(to, arises_1_h)| match condition {
+            Condition::Nominal if !matches!(to.condition, Condition::Done) => arises_1_h / 3600.0,
+            _ => self.rate_1_s(action, condition, to.condition),
+        });
+        let mut next: Vec<f64> = rates_1_s.map(|rate_1_s| rate_1_s * epoch_s).collect();
         next[from] = 0.0;
-        next.iter_mut().for_each(|rate_1_s| *rate_1_s *= epoch_s);
         let sum: f64 = next.iter().sum();
         if sum > 1.0 {
             return Err(ParameterError::Fast {
@@ -264,6 +230,30 @@ impl Model<'_> {
         }
         next[from] = 1.0 - sum;
         Ok(next)
+    }
+
+    /// How often a state that is not nominal becomes another, and any the end, 1/s.
+    fn rate_1_s(&self, action: &ActionParameters, from: Condition<'_>, to: Condition<'_>) -> f64 {
+        let Parameters {
+            task,
+            several,
+            unknown,
+            ..
+        } = self.parameters;
+        let is_named = |state: &&State<'_>| matches!(state.condition, Condition::Fault { .. });
+        match (from, to) {
+            (_, Condition::Done) => task.speed_m_s * action.speed_scale / task.rest_m,
+            (Condition::Fault { class, .. }, Condition::Nominal) => class.passes_1_s,
+            (Condition::Fault { .. }, Condition::Several) => several.arises_1_s,
+            (Condition::Unknown { is_old: false }, Condition::Nominal) => unknown.passes_1_s,
+            (Condition::Unknown { is_old: false }, Condition::Fault { .. }) => {
+                unknown.named_1_s / self.states.iter().filter(is_named).count() as f64
+            }
+            (Condition::Unknown { is_old: false }, Condition::Unknown { is_old: true }) => {
+                unknown.ages_1_s
+            }
+            _ => 0.0,
+        }
     }
 
     /// Distribution of the observation in a state: none, then every state's name. Nobody sees how
@@ -319,16 +309,4 @@ impl Model<'_> {
 fn row(numbers: &[f64]) -> String {
     let numbers: Vec<String> = numbers.iter().map(|value| number(*value)).collect();
     numbers.join(" ")
-}
-
-/// A number to twelve significant digits, in plain notation.
-fn number(value: f64) -> String {
-    let rounded = format!("{value:.DIGITS$e}").parse::<f64>().unwrap_or(value);
-    // No "-0".
-    format!("{}", rounded + 0.0)
-}
-
-fn line(text: &mut String, content: &str) {
-    // Writing to a string cannot fail.
-    let _ = writeln!(text, "{content}");
 }
