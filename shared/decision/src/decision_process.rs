@@ -7,10 +7,11 @@ use vigil_blocks::{
 use vigil_pomdp::policy::Measure;
 use vigil_pomdp::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
 
-use crate::action_hysteresis::hold;
 use crate::alarm_fusion::Situation;
+use crate::error::SupervisorError;
 use crate::inputs::Inputs;
-use crate::mapping::{self, ActionMeaning, SupervisorError};
+use crate::latch::stands;
+use crate::mapping::{self, ActionMeaning};
 use crate::policy::{self, Worth};
 use crate::settings::Settings;
 use crate::stage_loss::StageLossMonitor;
@@ -84,7 +85,7 @@ impl DecisionProcess {
             tracker: Tracker::new(&model),
             losses: StageLossMonitor::new(blind_after_misses),
             scratch: vec![0.0; model.states().len()],
-            choice: hold(0),
+            choice: stands(0),
             decision_seq: 0,
             log_evidence: 0.0,
             impossible_count: 0,

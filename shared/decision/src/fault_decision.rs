@@ -1,31 +1,40 @@
 //! Decisions about the leaves of the fault tree: the identifier's belief is the evidence.
 
-use vigil_blocks::{Action, ControlMode, DetectionBelief, FaultBelief, RecoveryKind};
+use vigil_blocks::{Action, ControlMode, DetectionBelief, FAULT_NODES, FaultBelief, RecoveryKind};
 use vigil_robot::{Description, FaultTree};
 
-use crate::action_hysteresis::ActionHysteresis;
 use crate::alarm_fusion::Situation;
 use crate::decision_process::{DecisionProcess, DecisionRule, Instruction};
-use crate::evidence::{self, Effect, EpochEvidence};
+use crate::error::SupervisorError;
 use crate::inputs::Inputs;
-use crate::mapping::{self, Compensation, StateMeaning, Subject, SupervisorError};
+use crate::latch::Latch;
+use crate::mapping::{self, Compensation};
 use crate::settings::Settings;
+use crate::state_belief::{self, write_weights};
+use crate::states::{self, Leaf, LeafKind, StateMeaning, Subject};
 
-/// Tracks the belief over the leaves of the fault tree, nominal and unknown, and chooses actions.
+/// What the identifier reports about. A change of it opens a decision at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Report {
+    identifying: u32,
+    alarm: bool,
+    mode_change_count: u32,
+    writer_epoch: u64,
+}
+
+/// Takes over the identifier's belief, tracks how old the unknown is, and chooses actions.
 pub(crate) struct FaultDecision {
     process: DecisionProcess,
     tree_hash: u64,
     states: Vec<StateMeaning>,
+    leaves: Vec<Leaf>,
+    /// Probability of every node of the tree, as last diagnosed.
+    p: [f64; FAULT_NODES],
     compensation: Vec<Compensation>,
     epoch_ns: u64,
     epoch_t_capture_ns: Option<u64>,
-    gathered: EpochEvidence,
-    hysteresis: ActionHysteresis,
-    /// The model knows how old the unknown is. Then its transitions are for that alone: what is
-    /// wrong the identifier says, in every epoch.
-    knows_age: bool,
-    /// True while the present action stands although another is better.
-    is_held: bool,
+    report: Option<Report>,
+    latch: Latch,
     instruction: Option<Instruction>,
 }
 
@@ -39,26 +48,21 @@ impl FaultDecision {
         settings: &Settings,
         compensation: Vec<Compensation>,
     ) -> Result<Self, SupervisorError> {
-        let states = mapping::states(&process.model, tree, robot)?;
-        mapping::check_compensation(&process.model, &states, &process.actions, &compensation)?;
-        let hold_epochs = (settings.hold_s * 1e3 / settings.epoch_ms).ceil() as u32;
-        let unknown = states.iter().filter(|m| m.subject == Subject::Unknown);
-        let knows_age = unknown.count() > 1;
-        let hysteresis = match knows_age {
-            true => ActionHysteresis::at_once(),
-            false => ActionHysteresis::new(hold_epochs),
-        };
+        let (model, actions) = (&process.model, &process.actions);
+        let states = states::states(model, tree)?;
+        let leaves = states::leaves(tree, robot);
+        mapping::check_compensation(model, &leaves, actions, &compensation)?;
         let mut rule = Self {
             process,
             tree_hash: tree.hash(),
             states,
+            leaves,
+            p: [0.0; FAULT_NODES],
             compensation,
             epoch_ns: (settings.epoch_ms * 1e6) as u64,
             epoch_t_capture_ns: None,
-            gathered: EpochEvidence::new(),
-            hysteresis,
-            knows_age,
-            is_held: false,
+            report: None,
+            latch: Latch::default(),
             instruction: None,
         };
         rule.begin();
@@ -68,12 +72,12 @@ impl FaultDecision {
     /// A run begins with nothing wrong, as the identifier's does. The model's own start is what its
     /// policy was solved for.
     fn begin(&mut self) {
-        let is_nominal = |m: &StateMeaning| f64::from(u8::from(m.subject == Subject::Node(0)));
+        let is_nominal = |m: &StateMeaning| f64::from(u8::from(m.subject == Subject::Nominal));
         for (weight, meaning) in self.process.scratch.iter_mut().zip(&self.states) {
             *weight = is_nominal(meaning);
         }
         self.process.tracker.anchor(&self.process.scratch);
-        self.decide(false);
+        self.decide();
     }
 
     fn take_diagnosis(&mut self, diagnosis: &FaultBelief, alarm: bool) {
@@ -81,36 +85,31 @@ impl FaultDecision {
             self.reset();
             self.process.run_id = diagnosis.run_id;
         }
-        let effect = self.gathered.add(diagnosis, &self.states, alarm);
+        let report = Report {
+            identifying: diagnosis.identifying,
+            alarm,
+            mode_change_count: diagnosis.mode_change_count,
+            writer_epoch: diagnosis.header.epoch,
+        };
+        let is_new = self.report.replace(report) != Some(report);
         let timed = self.epoch_is_over(diagnosis.header.t_capture_ns);
+        if !(is_new || timed) {
+            return;
+        }
         let process = &mut self.process;
         process.control_mode = ControlMode::Policy;
-        if effect == Effect::Anchor {
-            let belief = process.tracker.belief();
-            evidence::weights(diagnosis, &self.states, alarm, belief, &mut process.scratch);
-            process.tracker.anchor(&process.scratch);
-            process.log_evidence = 0.0;
-            self.decide(timed);
-        } else if timed {
-            // A call is one step of the model, however long it takes: it ends with a reset.
-            if self.hysteresis.called().is_none() {
-                process
-                    .tracker
-                    .predict(&process.model, process.choice.action);
-            }
-            self.gathered.take(&mut process.scratch);
-            let evidence = process.tracker.weigh(&process.scratch);
-            if let Some(log_probability) = process.log_probability(evidence) {
-                process.log_evidence = log_probability;
-            }
-            let belief = process.tracker.belief();
-            evidence::weights(diagnosis, &self.states, alarm, belief, &mut process.scratch);
-            let belief = process.tracker.belief();
-            if self.knows_age || evidence::has_drifted(belief, &process.scratch) {
-                process.tracker.anchor(&process.scratch);
-            }
-            self.decide(timed);
+        // A call is one step of the model, however long it takes: it ends with a reset.
+        if timed && self.latch.action().is_none() {
+            let action = process.choice.action;
+            process.tracker.predict(&process.model, action);
         }
+        let predicted = process.tracker.belief();
+        let weights = &mut process.scratch;
+        write_weights(diagnosis, &self.states, alarm, predicted, weights);
+        process.log_evidence = log_score(predicted, weights);
+        process.tracker.anchor(weights);
+        self.p = diagnosis.p;
+        self.decide();
     }
 
     /// True once per epoch, by differences of the capture time; a jump back begins a new epoch.
@@ -134,7 +133,7 @@ impl FaultDecision {
             false => 0.0,
         };
         let belief = self.process.tracker.belief();
-        let is_nominal = |meaning: &StateMeaning| meaning.subject == Subject::Node(0);
+        let is_nominal = |meaning: &StateMeaning| meaning.subject == Subject::Nominal;
         let faulty: f64 = belief
             .iter()
             .zip(&self.states)
@@ -154,21 +153,16 @@ impl FaultDecision {
         }
         self.process.tracker.anchor(&self.process.scratch);
         self.process.control_mode = ControlMode::Fallback;
-        let timed = self.epoch_is_over(detection.header.t_capture_ns);
-        self.decide(timed);
+        self.report = None;
+        self.decide();
     }
 
-    fn decide(&mut self, timed: bool) {
+    fn decide(&mut self) {
         let process = &mut self.process;
-        let belief = process.tracker.belief();
-        let best = process.decider.decide(belief).choice();
-        let values = process.worth.values(&process.decider, belief);
-        let current = self.instruction.map(|instruction| instruction.action);
-        process.choice = self
-            .hysteresis
-            .decide(current, best, values, &process.actions, timed);
-        let action = process.choice.action;
-        self.is_held = current == Some(action) && action != best.action;
+        let best = process.decider.decide(process.tracker.belief()).choice();
+        let actions = &process.actions;
+        let kind = |action: usize| actions.get(action).map_or(RecoveryKind::Stop, |m| m.kind);
+        process.choice = self.latch.choose(best, kind);
     }
 
     fn instruction(&self) -> Instruction {
@@ -176,17 +170,10 @@ impl FaultDecision {
             return self.process.safe_stop();
         }
         let action = self.process.choice.action;
-        // The belief no longer speaks for a held action, so its wheel stays what it was.
-        let held = self
-            .instruction
-            .filter(|last| self.is_held && last.action == action);
-        if let Some(held) = held {
-            return held;
-        }
         let kind = self.process.kind(action);
         let wheel = match kind {
-            RecoveryKind::Compensate => self.most_probable_wheel(true),
-            RecoveryKind::IgnoreEncoder => self.most_probable_wheel(false),
+            RecoveryKind::Compensate => self.most_probable_wheel(LeafKind::Stuck),
+            RecoveryKind::IgnoreEncoder => self.most_probable_wheel(LeafKind::Encoder),
             _ => None,
         };
         Instruction {
@@ -196,21 +183,30 @@ impl FaultDecision {
         }
     }
 
-    fn most_probable_wheel(&self, stuck: bool) -> Option<usize> {
+    fn most_probable_wheel(&self, kind: LeafKind) -> Option<usize> {
         let mut best = (None, 0.0);
-        for (meaning, b) in self.states.iter().zip(self.process.tracker.belief()) {
-            if meaning.wheel.is_some() && meaning.stuck == stuck && *b > best.1 {
-                best = (meaning.wheel, *b);
+        for leaf in self.leaves.iter().filter(|leaf| leaf.kind == kind) {
+            let p = self.p.get(leaf.node).copied().unwrap_or(0.0);
+            if leaf.wheel.is_some() && p > best.1 {
+                best = (leaf.wheel, p);
             }
         }
         best.0
     }
 }
 
+/// How well a belief was predicted: the mean of the logarithm of the predicted probability, over
+/// the belief that `weights` are. No more than 0; what was held impossible counts as 1e-12.
+fn log_score(predicted: &[f64], weights: &[f64]) -> f64 {
+    let sum: f64 = weights.iter().sum();
+    let score = |(predicted, weight): (&f64, &f64)| weight * predicted.clamp(1e-12, 1.0).ln();
+    let scores: f64 = predicted.iter().zip(weights).map(score).sum();
+    if sum > 0.0 { scores / sum } else { 0.0 }
+}
+
 impl DecisionRule for FaultDecision {
     fn take(&mut self, inputs: Inputs<'_>, situation: Situation) {
-        let is_sound =
-            |diagnosis: &FaultBelief| evidence::is_sound(diagnosis, &self.states, self.tree_hash);
+        let is_sound = |d: &FaultBelief| state_belief::is_sound(d, &self.states, self.tree_hash);
         let diagnosis = inputs.diagnosis.filter(|diagnosis| is_sound(diagnosis));
         let detection = inputs.detection.filter(|d| d.p_fault.is_finite());
         if diagnosis.is_some() != inputs.diagnosis.is_some() {
@@ -227,7 +223,7 @@ impl DecisionRule for FaultDecision {
         match (diagnosis, detection) {
             (Some(diagnosis), _) => {
                 if self.process.losses.diagnosis() {
-                    self.gathered.forget();
+                    self.report = None;
                 }
                 self.take_diagnosis(diagnosis, situation.alarm);
             }
@@ -246,26 +242,26 @@ impl DecisionRule for FaultDecision {
             self.process.losses.detection();
         }
         self.process.control_mode = ControlMode::Safe;
-        self.gathered.forget();
+        self.report = None;
     }
 
     fn miss(&mut self, count: u32) {
         if self.process.losses.miss(count) {
             self.process.control_mode = ControlMode::Safe;
-            self.gathered.forget();
+            self.report = None;
         }
     }
 
     fn reset(&mut self) {
         self.process.reset();
-        self.gathered.forget();
-        self.hysteresis.reset();
+        self.report = None;
+        self.latch.release();
         self.epoch_t_capture_ns = None;
         self.begin();
     }
 
     fn latched(&self) -> Option<usize> {
-        self.hysteresis.called()
+        self.latch.action()
     }
 
     fn write(&mut self, action: &mut Action) {

@@ -33,8 +33,19 @@
 use vigil_blocks::{DetectionBelief, FaultBelief};
 use vigil_pomdp::Pomdp;
 
-use crate::evidence::{DRIFT_MAX, LOG_EPOCH_MAX, LOG_RATIO_MAX, P_TOLERANCE};
+use crate::state_belief::P_TOLERANCE;
 
+/// One cycle can change the odds of a state by this factor at most, as a logarithm. Chosen by hand:
+/// e^20 is beyond any odds that a decision turns on, and one wild cycle cannot outweigh an epoch.
+const LOG_RATIO_MAX: f64 = 20.0;
+/// An epoch can change them by this factor at most. e^-300 is 5e-131: times a belief it is still a
+/// normal double, the least of which is 2e-308.
+const LOG_EPOCH_MAX: f64 = 300.0;
+/// The tracked belief may differ from the identifier's by this much (half the sum of absolute
+/// differences); beyond it, it is taken over. Chosen by hand: it changes no value by more than a
+/// twentieth of its range. Smaller discards what the decision model knows about mending; larger
+/// lets a fault fade that the identifier still holds.
+const DRIFT_MAX: f64 = 0.05;
 /// Something is wrong above this probability: more likely than not, as for every name.
 const WRONG_MIN: f64 = 0.5;
 /// An action mends a state if it leads out of it by this much more than the least that any does.

@@ -1,23 +1,26 @@
 #![doc = include_str!("../README.md")]
 
-mod action_hysteresis;
 mod alarm_fusion;
 mod decision_process;
 mod epoch;
-mod evidence;
+mod error;
 mod fault_decision;
 mod hardware;
 mod inputs;
+mod latch;
 mod mapping;
 mod observations;
 mod policy;
 mod settings;
 mod stage_loss;
+mod state_belief;
+mod states;
 mod supervisor;
 mod symptom_decision;
 
 pub use alarm_fusion::fused_alarm;
+pub use error::SupervisorError;
 pub use inputs::Inputs;
-pub use mapping::{Compensation, SupervisorError};
+pub use mapping::Compensation;
 pub use settings::{Evidence, Gate, Recovery, RecoveryAction, Settings};
 pub use supervisor::Supervisor;

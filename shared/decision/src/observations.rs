@@ -3,7 +3,7 @@
 use vigil_blocks::Symptoms;
 use vigil_pomdp::Pomdp;
 
-use crate::mapping::SupervisorError;
+use crate::error::SupervisorError;
 
 /// Name of the empty set.
 const NONE: &str = "none";

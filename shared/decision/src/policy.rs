@@ -5,7 +5,7 @@ use vigil_pomdp::mdp::Solution;
 use vigil_pomdp::policy::{Dual, Gate, Information, Measure, PolicyKind};
 use vigil_pomdp::{Decider, PointBased, Policy, Pomdp, QMdp};
 
-use crate::mapping::SupervisorError;
+use crate::error::SupervisorError;
 
 /// The decider for `model`, of which `solution` is the fully observable relaxation and `solved` the
 /// policy that was solved beforehand, if any.

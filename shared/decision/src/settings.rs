@@ -64,12 +64,6 @@ pub struct Settings {
     #[default(0.5)]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub arming_speed_scale: f64,
-    /// With `faults`: once `go_on` was left, it is taken again after it has been the best action
-    /// for this long without a break. More cautious actions are taken at once. A decision model
-    /// with the state `UNKNOWN_OLD` is obeyed at once.
-    #[default(2.0)]
-    #[schemars(range(min = 0.0, max = 600.0))]
-    pub hold_s: f64,
     /// Validity of a published action, as a multiple of the period; 20 ms at least.
     #[default(10.0)]
     #[schemars(range(min = 1.0, max = 1000.0), extend("x-unit" = "periods"))]

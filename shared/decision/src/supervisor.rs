@@ -6,9 +6,10 @@ use vigil_robot::{Description, FaultTree};
 
 use crate::alarm_fusion::AlarmFusion;
 use crate::decision_process::{DecisionProcess, DecisionRule};
+use crate::error::SupervisorError;
 use crate::fault_decision::FaultDecision;
 use crate::inputs::Inputs;
-use crate::mapping::{Compensation, SupervisorError};
+use crate::mapping::Compensation;
 use crate::settings::{self, Settings};
 use crate::symptom_decision::SymptomDecision;
 

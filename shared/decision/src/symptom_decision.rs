@@ -4,13 +4,14 @@ use vigil_blocks::{Action, ControlMode, DetectionBelief, FaultBelief, RecoveryKi
 use vigil_pomdp::policy::choose_among;
 use vigil_robot::FaultTree;
 
-use crate::action_hysteresis::{assert_latched, hold};
 use crate::alarm_fusion::Situation;
 use crate::decision_process::{DecisionProcess, DecisionRule, Instruction};
 use crate::epoch::{End, Epoch, Limits};
+use crate::error::SupervisorError;
 use crate::hardware::HardwareEvidence;
 use crate::inputs::Inputs;
-use crate::mapping::{self, ActionMeaning, SupervisorError};
+use crate::latch::Latch;
+use crate::mapping::{self, ActionMeaning};
 use crate::observations::Observations;
 use crate::settings::Settings;
 
@@ -34,7 +35,7 @@ pub(crate) struct SymptomDecision {
     epoch_ns: u64,
     action_ns: u64,
     /// The call for help, or the end of the task, that stands.
-    latched: Option<usize>,
+    latch: Latch,
     last_kind: Option<RecoveryKind>,
 }
 
@@ -60,7 +61,7 @@ impl SymptomDecision {
             epoch: Epoch::default(),
             epoch_ns: (settings.epoch_ms * 1e6) as u64,
             action_ns: (settings.action_max_s * 1e9) as u64,
-            latched: None,
+            latch: Latch::default(),
             last_kind: None,
         };
         rule.choose();
@@ -98,8 +99,9 @@ impl SymptomDecision {
         let set = self.epoch.take_set(detection.header.t_capture_ns, end);
         self.track(set, end);
         let before = self.process.choice.action;
-        let again =
-            end != End::Unfinished && self.latched.is_none() && has_end(self.process.kind(before));
+        let again = end != End::Unfinished
+            && self.latch.action().is_none()
+            && has_end(self.process.kind(before));
         self.choose();
         // What has an end is done again when it is decided again; what goes on, goes on.
         if self.process.choice.action != before || again {
@@ -140,7 +142,7 @@ impl SymptomDecision {
     }
 
     fn limits(&self) -> Limits {
-        let unless_latched = |ns: u64| self.latched.is_none().then_some(ns);
+        let unless_latched = |ns: u64| self.latch.action().is_none().then_some(ns);
         Limits {
             epoch_ns: unless_latched(self.epoch_ns),
             running_ns: unless_latched(self.action_ns),
@@ -227,18 +229,9 @@ impl SymptomDecision {
             let values = process.worth.values(&process.decider, belief);
             best = choose_among(values, |action| hardware.allows(action));
         }
-        let latched = self.latched;
-        process.choice = match latched {
-            Some(action) if action != best.action => hold(action),
-            _ => best,
-        };
-        let action = process.choice.action;
-        let latches = matches!(
-            process.kind(action),
-            RecoveryKind::CallForHelp | RecoveryKind::GiveUp
-        );
-        self.latched = latches.then_some(action);
-        assert_latched(latched, self.latched);
+        let actions = &process.actions;
+        let kind = |action: usize| actions.get(action).map_or(RecoveryKind::Stop, |m| m.kind);
+        process.choice = self.latch.choose(best, kind);
     }
 
     /// Opens a new decision, whose outcome is waited for.
@@ -295,13 +288,13 @@ impl DecisionRule for SymptomDecision {
             hardware.reset();
         }
         self.epoch.reset();
-        self.latched = None;
+        self.latch.release();
         self.choose();
         self.open_decision();
     }
 
     fn latched(&self) -> Option<usize> {
-        self.latched
+        self.latch.action()
     }
 
     fn write(&mut self, action: &mut Action) {

@@ -19,8 +19,10 @@
 
 mod alphas;
 mod backup;
+mod compact;
 mod controller;
 mod export;
+mod followers;
 mod frontier;
 mod grid;
 mod initial;
@@ -33,6 +35,7 @@ mod search;
 mod tree;
 mod trial;
 
+pub use compact::{Compact, compact};
 pub use method::{Answer, Method, MethodError, bound};
 pub use point_based::solve;
 pub use report::{Bracket, EndReason, Options, Progress, SearchResult};

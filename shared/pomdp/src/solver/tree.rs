@@ -1,6 +1,7 @@
 //! The beliefs that were reached, what may follow upon them, and what is known of their values.
 
 use super::alphas::{AlphaId, Alphas};
+use super::followers::Followers;
 use super::sawtooth::{Query, Sawtooth};
 use crate::bounds::tib::Tib;
 use crate::budget::{Budget, StopRequest};
@@ -51,8 +52,7 @@ pub(super) struct Tree<'m> {
     pub sawtooth: Sawtooth,
     /// Backups of the lower bound try every action, not only the most promising ones.
     pub is_thorough: bool,
-    predicted: Vec<f64>,
-    entries: Vec<(u32, f64)>,
+    followers: Followers,
 }
 
 impl<'m> Tree<'m> {
@@ -72,8 +72,7 @@ impl<'m> Tree<'m> {
             alphas,
             sawtooth,
             is_thorough: false,
-            predicted: vec![0.0; model.states().len()],
-            entries: Vec::new(),
+            followers: Followers::default(),
         }
     }
 
@@ -202,41 +201,20 @@ impl<'m> Tree<'m> {
         if let Some((first, count)) = self.branches[branch].children {
             return Ok(first as usize..(first + count) as usize);
         }
-        let mut predicted = std::mem::take(&mut self.predicted);
-        predicted.fill(0.0);
-        let mut work = predicted.len();
-        for (s, b) in self.beliefs.entries(id) {
-            let successors = self.model.successors(*s as usize, action);
-            work += successors.len();
-            for (to, p) in successors {
-                predicted[*to] += b * p;
-            }
-        }
+        let model = self.model;
+        let mut followers = std::mem::take(&mut self.followers);
+        let belief = self.beliefs.entries(id).to_vec();
         let mut made = Vec::new();
-        let mut entries = std::mem::take(&mut self.entries);
-        for observation in 0..self.model.observations().len() {
-            let likelihood = self.model.likelihood(action, observation).iter();
-            entries.clear();
-            entries.extend(predicted.iter().zip(likelihood).enumerate().filter_map(
-                |(s, (b, z))| {
-                    let w = b * z;
-                    (w > 0.0).then_some((s as u32, w))
-                },
-            ));
-            let probability: f64 = entries.iter().map(|(_, w)| w).sum();
-            if probability <= 0.0 {
-                continue;
-            }
-            entries.iter_mut().for_each(|(_, w)| *w /= probability);
-            budget.spend(predicted.len())?;
+        let work = followers.each(model, &belief, action, |follower| {
             made.push(Child {
-                probability,
-                observation: observation as u32,
-                node: self.node(&entries, budget)?,
+                probability: follower.probability,
+                observation: follower.observation as u32,
+                node: self.node(follower.belief, budget)?,
             });
-        }
-        self.predicted = predicted;
-        self.entries = entries;
+            Ok(())
+        });
+        self.followers = followers;
+        let work = work?;
         let first = self.children.len();
         self.children.extend(&made);
         self.branches[branch].children = Some((first as u32, made.len() as u32));

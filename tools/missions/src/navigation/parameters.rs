@@ -6,6 +6,8 @@ use serde::Deserialize;
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
+    /// What the file is for: `navigation`.
+    pub model: String,
     /// Discount per decision step, 0 to below 1.
     pub discount: f64,
     /// Chance per step that the exception arises in a nominal robot.

@@ -1,12 +1,8 @@
-//! From parameters and leaves to a `.pomdp` text.
+//! From parameters to a `.pomdp` text.
 
 use crate::model_text::{line, number};
 
 use super::parameters::{ActionParameters, Fault, ParameterError, Parameters};
-
-/// Class of every leaf that no other class has, and the name of its state.
-const REST: &str = "*";
-const FAULT: &str = "FAULT";
 
 const HEAD: &str = "\
 # What to do about a fault. Generated: change the parameters, not this file.
@@ -15,20 +11,11 @@ const HEAD: &str = "\
 # an alarm that has just risen: a policy is solved for it; a run of the supervisor begins nominal.
 ";
 
-/// A leaf of the fault tree.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Leaf {
-    /// Its name.
-    pub name: String,
-    /// Its fault: `stuck:LF`.
-    pub fault: String,
-}
-
 /// What a state of the model is.
 #[derive(Clone, Copy)]
 enum Condition<'a> {
     Nominal,
-    Fault { class: &'a Fault, members: f64 },
+    Fault(&'a Fault),
     Several,
     Unknown { is_old: bool },
     Done,
@@ -43,12 +30,12 @@ struct State<'a> {
 /// Writes the model, in Cassandra's format.
 ///
 /// # Errors
-/// [`ParameterError`] if a parameter means nothing, or does not fit the leaves.
-pub fn generate(parameters: &Parameters, leaves: &[Leaf]) -> Result<String, ParameterError> {
+/// [`ParameterError`] if a parameter means nothing.
+pub fn generate(parameters: &Parameters) -> Result<String, ParameterError> {
     parameters.check()?;
     let model = Model {
         parameters,
-        states: states(parameters, leaves)?,
+        states: states(parameters),
     };
     let names: Vec<&str> = model.states.iter().map(|state| state.name).collect();
     let actions = parameters.action.iter().map(|action| action.name.as_str());
@@ -125,50 +112,19 @@ fn write_rewards(text: &mut String, model: &Model<'_>) {
 }
 
 /// States in the model's order: nominal first, the end last.
-fn states<'a>(
-    parameters: &'a Parameters,
-    leaves: &'a [Leaf],
-) -> Result<Vec<State<'a>>, ParameterError> {
-    let word = |leaf: &'a Leaf| leaf.fault.split(':').next().unwrap_or_default();
-    let classes = &parameters.fault;
-    let of = |name: &str| classes.iter().find(|class| class.leaves == name);
-    let class = |leaf: &'a Leaf| of(word(leaf)).or_else(|| of(REST));
-    if let Some(leaf) = leaves.iter().find(|leaf| class(leaf).is_none()) {
-        return Err(ParameterError::NoClass {
-            leaf: leaf.name.clone(),
-            fault: leaf.fault.clone(),
-        });
-    }
-    let mut states = vec![State {
-        name: "ND",
-        condition: Condition::Nominal,
-    }];
-    for class in classes {
-        let fault = |name, members| State {
-            name,
-            condition: Condition::Fault { class, members },
-        };
-        if class.leaves == REST {
-            states.push(fault(FAULT, 1.0));
-            continue;
-        }
-        let own = leaves.iter().filter(|leaf| word(leaf) == class.leaves);
-        let members = own.clone().count();
-        if members == 0 {
-            return Err(ParameterError::NoLeaf(class.leaves.clone()));
-        }
-        states.extend(own.map(|leaf| fault(leaf.name.as_str(), members as f64)));
-    }
-    states.extend(
-        [
-            ("SEVERAL", Condition::Several),
-            ("UNKNOWN", Condition::Unknown { is_old: false }),
-            ("UNKNOWN_OLD", Condition::Unknown { is_old: true }),
-            ("DONE", Condition::Done),
-        ]
-        .map(|(name, condition)| State { name, condition }),
-    );
-    Ok(states)
+fn states(parameters: &Parameters) -> Vec<State<'_>> {
+    let state = |name, condition| State { name, condition };
+    let faults = parameters.fault.iter();
+    let faults = faults.map(|fault| state(fault.state.as_str(), Condition::Fault(fault)));
+    std::iter::once(state("ND", Condition::Nominal))
+        .chain(faults)
+        .chain([
+            state("SEVERAL", Condition::Several),
+            state("UNKNOWN", Condition::Unknown { is_old: false }),
+            state("UNKNOWN_OLD", Condition::Unknown { is_old: true }),
+            state("DONE", Condition::Done),
+        ])
+        .collect()
 }
 
 struct Model<'a> {
@@ -187,7 +143,7 @@ impl Model<'_> {
     /// How often each state arises in a healthy robot, 1/h.
     fn arises_1_h(&self) -> impl Iterator<Item = f64> {
         self.states.iter().map(|state| match state.condition {
-            Condition::Fault { class, members } => class.arises_1_h / members,
+            Condition::Fault(fault) => fault.arises_1_h,
             Condition::Unknown { is_old: false } => self.parameters.unknown.arises_1_h,
             _ => 0.0,
         })
@@ -240,13 +196,13 @@ impl Model<'_> {
             unknown,
             ..
         } = self.parameters;
-        let is_named = |state: &&State<'_>| matches!(state.condition, Condition::Fault { .. });
+        let is_named = |state: &&State<'_>| matches!(state.condition, Condition::Fault(_));
         match (from, to) {
             (_, Condition::Done) => task.speed_m_s * action.speed_scale / task.rest_m,
-            (Condition::Fault { class, .. }, Condition::Nominal) => class.passes_1_s,
-            (Condition::Fault { .. }, Condition::Several) => several.arises_1_s,
+            (Condition::Fault(fault), Condition::Nominal) => fault.passes_1_s,
+            (Condition::Fault(_), Condition::Several) => several.arises_1_s,
             (Condition::Unknown { is_old: false }, Condition::Nominal) => unknown.passes_1_s,
-            (Condition::Unknown { is_old: false }, Condition::Fault { .. }) => {
+            (Condition::Unknown { is_old: false }, Condition::Fault(_)) => {
                 unknown.named_1_s / self.states.iter().filter(is_named).count() as f64
             }
             (Condition::Unknown { is_old: false }, Condition::Unknown { is_old: true }) => {
@@ -286,12 +242,12 @@ impl Model<'_> {
     fn price(&self, action: &ActionParameters, condition: Condition<'_>) -> f64 {
         let parameters = self.parameters;
         let scale = action.speed_scale;
-        let answers = |class: &Fault| action.remedies.as_deref() == Some(class.leaves.as_str());
+        let answers = |fault: &Fault| action.remedies.as_deref() == Some(fault.state.as_str());
         let (price_1_m, is_answered) = match condition {
             Condition::Nominal | Condition::Done => (0.0, false),
-            Condition::Fault { class, .. } => match class.remedied_1_m.filter(|_| answers(class)) {
+            Condition::Fault(fault) => match fault.remedied_1_m.filter(|_| answers(fault)) {
                 Some(remedied_1_m) => (remedied_1_m, true),
-                None => (class.price_1_m * scale, false),
+                None => (fault.price_1_m * scale, false),
             },
             Condition::Several => (parameters.several.price_1_m * scale, false),
             Condition::Unknown { .. } => (parameters.unknown.price_1_m * scale, false),

@@ -1,8 +1,8 @@
-//! The model of what to do about faults, from the fault tree and a few parameters.
+//! The model of what to do about faults, from a few parameters.
 //!
-//! States are nominal (`ND`), a leaf of the tree each or all in one (`FAULT`), two faults or more
-//! (`SEVERAL`), what nothing explains, new and old (`UNKNOWN`, `UNKNOWN_OLD`), and the end of the
-//! task (`DONE`). Rewards are what a healthy robot would not have paid, so that a robot with
+//! States are nominal (`ND`), a leaf of the fault tree or leaves about which the same is done
+//! (`STUCK`, `FAULT`), two faults or more (`SEVERAL`), what nothing explains, new and old
+//! (`UNKNOWN`, `UNKNOWN_OLD`), and the end of the task (`DONE`). Rewards are what a healthy robot would not have paid, so that a robot with
 //! nothing wrong loses only time.
 //!
 //! - The task ends with the way: a robot that stands comes no nearer to its end. So the discount
@@ -18,5 +18,5 @@
 mod generator;
 mod parameters;
 
-pub use generator::{Leaf, generate};
+pub use generator::generate;
 pub use parameters::{ActionParameters, ParameterError, Parameters};

@@ -2,11 +2,13 @@
 
 use serde::Deserialize;
 
-/// Everything that the model is made from, but for the fault tree. Prices are in units of the
+/// Everything that the model is made from. Prices are in units of the
 /// user's choice, the same for all.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
+    /// What the file is for: `recovery`.
+    pub model: String,
     /// Discount per step, 0 to below 1.
     pub discount: f64,
     /// Length of a step: `supervisor.epoch_ms`, in s.
@@ -17,7 +19,7 @@ pub struct Parameters {
     pub help: Help,
     /// What the robot can do.
     pub action: Vec<ActionParameters>,
-    /// Classes of leaves of the fault tree.
+    /// Faults of the fault tree.
     pub fault: Vec<Fault>,
     /// Two faults or more.
     pub several: Several,
@@ -61,20 +63,20 @@ pub struct ActionParameters {
     pub speed_scale: f64,
     /// Chance that a step's evidence speaks for the truth, 0 to 1.
     pub sees: f64,
-    /// The class of faults that it answers, by its `leaves`.
+    /// The faults that it answers, by their `state`.
     pub remedies: Option<String>,
     /// Price of a metre where there is none of these.
     #[serde(default)]
     pub needless_1_m: f64,
 }
 
-/// A class of leaves of the fault tree.
+/// Faults that have one state: what is done about one is done about each of them.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
-    /// First word of the leaves' faults: `stuck` for `stuck:LF`. `*` is every leaf that no other
-    /// class has, all in one state.
-    pub leaves: String,
+    /// Name of the state: that of a leaf of the fault tree, of a node above leaves, or of a kind of
+    /// faults in capitals, `STUCK` for `stuck:LF`. `FAULT` is every leaf that no other has.
+    pub state: String,
     /// How often one of them arises, 1/h.
     pub arises_1_h: f64,
     /// How often a fault passes by itself, 1/s.
@@ -135,24 +137,18 @@ pub enum ParameterError {
         /// What it may be.
         allowed: &'static str,
     },
-    /// A class of faults has no leaf.
-    #[error("fault '{0}': no leaf of the fault tree has such a fault")]
-    NoLeaf(String),
-    /// A leaf belongs to no class.
-    #[error("leaf '{leaf}' ({fault}) belongs to no [[fault]]; '*' takes all that are left")]
-    NoClass {
-        /// Name of the leaf.
-        leaf: String,
-        /// Its fault.
-        fault: String,
-    },
-    /// An action answers a class that is not there.
-    #[error("action '{action}' remedies '{class}', which is no [[fault]]")]
+    /// Two states have one name.
+    #[error(
+        "state '{0}' appears twice; ND, SEVERAL, UNKNOWN, UNKNOWN_OLD and DONE are always there"
+    )]
+    SameState(String),
+    /// An action answers a fault that is not there.
+    #[error("action '{action}' remedies '{fault}', which is the state of no [[fault]]")]
     NoFault {
         /// Name of the action.
         action: String,
         /// What it remedies.
-        class: String,
+        fault: String,
     },
     /// Rates are so large that a step may leave a state more than once.
     #[error("the rates out of state {state} sum to {sum} in a step of {epoch_s} s; allowed is 1")]
@@ -200,6 +196,13 @@ impl Parameters {
         share("evidence.confused".into(), self.evidence.confused)?;
         let nominal = self.evidence.nominal_at_an_alarm;
         share("evidence.nominal_at_an_alarm".into(), nominal)?;
+        let always = ["ND", "SEVERAL", "UNKNOWN", "UNKNOWN_OLD", "DONE"];
+        for (at, fault) in self.fault.iter().enumerate() {
+            let before = self.fault[..at].iter().map(|other| other.state.as_str());
+            if before.chain(always).any(|name| name == fault.state) {
+                return Err(ParameterError::SameState(fault.state.clone()));
+            }
+        }
         for action in &self.action {
             share(
                 format!("action {}.speed_scale", action.name),
@@ -209,12 +212,12 @@ impl Parameters {
             let seen = action.sees * (1.0 + self.evidence.confused);
             let key = format!("action {}.sees, with what is confused", action.name);
             share(key, seen)?;
-            let class = action.remedies.as_deref();
-            let is_there = |class: &str| self.fault.iter().any(|fault| fault.leaves == class);
-            if let Some(class) = class.filter(|class| !is_there(class)) {
+            let remedied = action.remedies.as_deref();
+            let is_there = |state: &str| self.fault.iter().any(|fault| fault.state == state);
+            if let Some(state) = remedied.filter(|state| !is_there(state)) {
                 return Err(ParameterError::NoFault {
                     action: action.name.clone(),
-                    class: class.to_owned(),
+                    fault: state.to_owned(),
                 });
             }
         }
@@ -239,7 +242,7 @@ impl Parameters {
         .map(|(key, found)| (key.to_owned(), found))
         .to_vec();
         for fault in &self.fault {
-            let key = |name: &str| format!("fault {}.{name}", fault.leaves);
+            let key = |name: &str| format!("fault {}.{name}", fault.state);
             amounts.push((key("arises_1_h"), fault.arises_1_h));
             amounts.push((key("passes_1_s"), fault.passes_1_s));
             amounts.push((key("price_1_m"), fault.price_1_m));

@@ -1,30 +1,16 @@
 //! The shipped recovery model: what its file holds, and what its policy does.
 
-use toml::Table;
-use vigil_missions::recovery::{Leaf, ParameterError, Parameters, generate};
+use vigil_missions::recovery::{ParameterError, Parameters, generate};
 use vigil_pomdp::policy::Policy;
 use vigil_pomdp::policy_file::PolicyFile;
 use vigil_pomdp::{PointBased, Pomdp, QMdp, mdp};
 
 const MODEL: &str = include_str!("../../../../config/rover.pomdp");
-const PARAMETERS: &str = include_str!("../../../../config/recovery.toml");
-const TREE: &str = include_str!("../../../../config/trees/rover.toml");
+const PARAMETERS: &str = include_str!("../../../../config/rover.recovery.toml");
 const POLICY: &[u8] = include_bytes!("../../../../config/rover.policy.json");
 
 fn parameters() -> Parameters {
     toml::from_str(PARAMETERS).unwrap()
-}
-
-fn leaves() -> Vec<Leaf> {
-    let tree: Table = TREE.parse().unwrap();
-    let nodes = tree["node"].as_array().unwrap().iter();
-    let leaf = |node: &toml::Value| {
-        Some(Leaf {
-            fault: node.get("fault")?.as_str()?.to_owned(),
-            name: node["name"].as_str()?.to_owned(),
-        })
-    };
-    nodes.filter_map(leaf).collect()
 }
 
 fn model() -> Pomdp {
@@ -51,9 +37,8 @@ fn belief(model: &Pomdp, parts: &[(&str, f64)]) -> Vec<f64> {
 #[test]
 fn the_file_is_what_its_parameters_generate() {
     assert!(
-        generate(&parameters(), &leaves()).unwrap() == MODEL,
-        "run: vigil pomdp generate config/recovery.toml --tree config/trees/rover.toml --out \
-         config/rover.pomdp, and solve again"
+        generate(&parameters()).unwrap() == MODEL,
+        "run: vigil pomdp generate config/rover.recovery.toml --out config/rover.pomdp, and solve again"
     );
     assert!(model().warnings().is_empty());
 }
@@ -73,7 +58,7 @@ fn actions_differ_in_more_than_what_a_step_costs() {
     );
     // Help mends everything in one step, and the rest is as healthy as it can be.
     let (help, stop) = (action(&model, "call_for_help"), action(&model, "stop"));
-    for name in ["LF_STUCK", "SEVERAL", "UNKNOWN_OLD"] {
+    for name in ["STUCK", "SEVERAL", "UNKNOWN_OLD"] {
         assert_eq!(
             model.successors(state(&model, name), help),
             [(nominal, 1.0)]
@@ -96,7 +81,7 @@ fn actions_differ_in_more_than_what_a_step_costs() {
 #[test]
 fn a_step_is_made_of_the_rates_and_prices_of_the_file() {
     let (model, parameters) = (model(), parameters());
-    let (stuck, slow) = (state(&model, "RM_STUCK"), action(&model, "slow_down"));
+    let (stuck, slow) = (state(&model, "STUCK"), action(&model, "slow_down"));
     let next = model.successors(stuck, slow);
     let to = |name: &str| {
         let found = next.iter().find(|(s, _)| *s == state(&model, name));
@@ -109,13 +94,12 @@ fn a_step_is_made_of_the_rates_and_prices_of_the_file() {
     let price = |s: usize, a: &str| -model.reward(s, action(&model, a));
     assert!((price(stuck, "slow_down") - (100.0 * 0.011 + 0.1)).abs() < 1e-9);
     assert!((price(stuck, "compensate") - (10.0 * 0.0154 + 0.1)).abs() < 1e-9);
-    let encoder = state(&model, "LF_ENC");
+    let encoder = state(&model, "ENCODER");
     assert!((price(encoder, "compensate") - ((75.0 * 0.7 + 100.0) * 0.0154 + 0.1)).abs() < 1e-9);
     assert!((price(encoder, "call_for_help") - 330.0).abs() < 1e-9);
-    // Six wheels share the rate.
     let start = model.start();
-    let sum = 0.4 + 0.35 + 0.25;
-    assert!((start[stuck] - 0.6 * parameters.fault[0].arises_1_h / sum / 6.0).abs() < 1e-12);
+    let sum = 0.4 + 0.35 + 0.25 + 0.25;
+    assert!((start[stuck] - 0.6 * parameters.fault[0].arises_1_h / sum).abs() < 1e-12);
 }
 
 #[test]
@@ -136,8 +120,8 @@ fn the_solved_policy_calls_where_qmdp_waits_for_ever() {
     assert_eq!(chosen(&mut solved, &old), "call_for_help");
     for (parts, wanted) in [
         (&[("ND", 1.0)][..], "go_on"),
-        (&[("RM_STUCK", 1.0)], "compensate"),
-        (&[("LF_ENC", 1.0)], "ignore_encoder"),
+        (&[("STUCK", 1.0)], "compensate"),
+        (&[("ENCODER", 1.0)], "ignore_encoder"),
         (&[("SEVERAL", 1.0)], "call_for_help"),
         (&[("ND", 0.5), ("UNKNOWN", 0.5)], "slow_down"),
     ] {
@@ -148,17 +132,21 @@ fn the_solved_policy_calls_where_qmdp_waits_for_ever() {
 }
 
 #[test]
-fn a_robot_of_any_faults_has_one_state_for_them() {
-    let mut parameters = parameters();
-    parameters.fault.truncate(1);
-    parameters.fault[0].leaves = "*".to_owned();
-    for action in &mut parameters.action {
-        action.remedies = None;
-    }
-    let model = Pomdp::parse(&generate(&parameters, &[]).unwrap()).unwrap();
+fn the_model_of_any_robot_is_what_its_parameters_generate() {
+    let parameters = toml::from_str(include_str!("../../../../config/any-robot.recovery.toml"));
+    let text = generate(&parameters.unwrap()).unwrap();
+    let shipped = include_str!("../../../../config/any-robot.pomdp");
+    assert!(
+        text == shipped,
+        "run: vigil pomdp generate config/any-robot.recovery.toml --out config/any-robot.pomdp, \
+         and solve again"
+    );
+    let model = Pomdp::parse(&text).unwrap();
     let states = ["ND", "FAULT", "SEVERAL", "UNKNOWN", "UNKNOWN_OLD", "DONE"];
     assert_eq!(model.states(), states);
     assert!(model.warnings().is_empty());
+    let policy = include_bytes!("../../../../config/any-robot.policy.json");
+    PolicyFile::read(policy, &model).unwrap();
 }
 
 #[test]
@@ -166,7 +154,7 @@ fn parameters_that_mean_nothing_are_named() {
     let refused = |change: fn(&mut Parameters)| {
         let mut parameters = parameters();
         change(&mut parameters);
-        generate(&parameters, &leaves()).unwrap_err()
+        generate(&parameters).unwrap_err()
     };
     let text = |change| refused(change).to_string();
     assert_eq!(
@@ -179,30 +167,24 @@ fn parameters_that_mean_nothing_are_named() {
     );
     assert_eq!(
         text(|p| p.fault[0].price_1_m = -1.0),
-        "fault stuck.price_1_m is -1; allowed is any finite number from 0"
+        "fault STUCK.price_1_m is -1; allowed is any finite number from 0"
     );
     assert_eq!(
-        refused(|p| p.fault[0].leaves = "tyre".to_owned()),
+        refused(|p| p.fault[0].state = "TYRE".to_owned()),
         ParameterError::NoFault {
             action: "compensate".to_owned(),
-            class: "stuck".to_owned(),
+            fault: "STUCK".to_owned(),
         }
     );
-    assert_eq!(
-        text(|p| {
-            p.fault.truncate(1);
-            p.action[4].remedies = None;
-        }),
-        "leaf 'LF_ENC' (encoder:LF) belongs to no [[fault]]; '*' takes all that are left"
-    );
-    assert_eq!(
-        text(|p| {
-            let mut servo = p.fault[0].clone();
-            servo.leaves = "servo".to_owned();
-            p.fault.push(servo);
-        }),
-        "fault 'servo': no leaf of the fault tree has such a fault"
-    );
+    for (name, change) in [
+        (
+            "DONE",
+            (|p| p.fault[2].state = "DONE".to_owned()) as fn(&mut Parameters),
+        ),
+        ("STUCK", |p| p.fault[1].state = "STUCK".to_owned()),
+    ] {
+        assert_eq!(refused(change), ParameterError::SameState(name.to_owned()));
+    }
     assert!(
         text(|p| p.unknown.ages_1_s = 20.0).starts_with("the rates out of state UNKNOWN sum to")
     );

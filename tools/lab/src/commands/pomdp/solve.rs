@@ -7,14 +7,16 @@ use serde::Serialize;
 use vigil_cycle::clock::process_cpu_s;
 use vigil_cycle::signal;
 use vigil_pomdp::policy_file::{PolicyFile, alpha, appl};
-use vigil_pomdp::solver::{Answer, EndReason, Method, Options, Progress, bound};
-use vigil_pomdp::{Budget, Pomdp};
+use vigil_pomdp::solver::{Answer, EndReason, Method, Options, Progress, bound, compact};
+use vigil_pomdp::{AlphaVectors, Budget, Pomdp};
 
 use super::{load, print, save};
 use vigil_terminal::{CommandError, Outcome};
 
 /// Memory at which the search ends, bytes.
 const MEMORY_BYTES_MAX: usize = 3 << 30;
+/// Standard errors by which what a small policy loses is thought to be more than in the sample.
+const LOSS_ERRORS: f64 = 4.0;
 /// Progress is printed when this factor of time has passed since the last line.
 const PROGRESS_FACTOR: f64 = 1.5;
 /// ... the first time after so many seconds.
@@ -50,10 +52,13 @@ pub struct Args {
     )]
     precision: f64,
     /// Where to write the policy. The name decides the format: `.policy` is APPL's, `.alpha` is
-    /// pomdp-solve's, any other is Vigil's own, which `supervisor.policy_file` takes. A coarse
-    /// --precision gives fewer vectors and quicker decisions.
+    /// pomdp-solve's, any other is Vigil's own, which `supervisor.policy_file` takes.
     #[arg(long, value_name = "POLICY")]
     out: Option<PathBuf>,
+    /// Vectors of the policy that is written, at most: those that lose least, as a live decision
+    /// takes as long as it has vectors. What they lose is sampled, and said.
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    vectors_max: usize,
     /// Print one JSON document.
     #[arg(long)]
     json: bool,
@@ -80,6 +85,9 @@ struct Document {
     points: usize,
     vectors: usize,
     policy: Option<String>,
+    policy_vectors: Option<usize>,
+    /// What the policy earns at least; what its fewer vectors lose is sampled.
+    policy_lower: Option<f64>,
 }
 
 /// Solves, and prints what was found.
@@ -110,14 +118,47 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     };
     let answer = bound(args.method, &model, &options, &mut budget, watch)
         .map_err(|e| CommandError::failure(format!("{}: {e}", args.file.display())))?;
+    let policy = match &args.out {
+        Some(_) => Some(policy(args, &model, &answer)?),
+        None => None,
+    };
     let cpu_s = process_cpu_s();
-    if let Some(out) = &args.out {
-        let bytes = policy_bytes(args, &model, &answer, cpu_s, out)?;
-        save(out, bytes)?;
+    if let Some((out, policy)) = args.out.as_ref().zip(policy.as_ref()) {
+        save(
+            out,
+            policy_bytes(args, &model, &answer, policy, cpu_s, out)?,
+        )?;
     }
-    let document = document(args, &model, &answer, cpu_s);
+    let document = document(args, &model, &answer, policy.as_ref(), cpu_s);
     print(args.json, &document, || summary(&document))?;
     Ok(Outcome::Done)
+}
+
+/// A policy, and what it earns at least.
+struct Exported {
+    lower: f64,
+    vectors: AlphaVectors,
+}
+
+/// The policy of an answer, with no more vectors than are asked for. Choosing them takes some
+/// seconds at most beyond the time that was given; Ctrl-C ends it.
+fn policy(args: &Args, model: &Pomdp, answer: &Answer) -> Result<Exported, CommandError> {
+    let (Some(vectors), Some(lower)) = (&answer.vectors, answer.lower) else {
+        let message = "--out: ended before there was a policy; give it more time by --timeout";
+        return Err(CommandError::failure(message));
+    };
+    let mut stop = signal::stop_requested;
+    let small = compact(
+        model,
+        vectors,
+        args.vectors_max,
+        &mut Budget::new(&mut stop),
+    )
+    .map_err(|error| CommandError::failure(format!("--vectors-max: {error}")))?;
+    Ok(Exported {
+        lower: lower - small.loss_mean - LOSS_ERRORS * small.loss_error,
+        vectors: small.vectors,
+    })
 }
 
 fn check(args: &Args) -> Result<(), CommandError> {
@@ -142,13 +183,11 @@ fn policy_bytes(
     args: &Args,
     model: &Pomdp,
     answer: &Answer,
+    policy: &Exported,
     cpu_s: f64,
     out: &Path,
 ) -> Result<Vec<u8>, CommandError> {
-    let (Some(vectors), Some(lower)) = (&answer.vectors, answer.lower) else {
-        let message = "--out: ended before there was a policy; give it more time by --timeout";
-        return Err(CommandError::failure(message));
-    };
+    let vectors = &policy.vectors;
     let extension = out.extension().and_then(|extension| extension.to_str());
     match extension {
         Some("policy") => Ok(appl::write(vectors, &args.file.display().to_string()).into_bytes()),
@@ -158,7 +197,7 @@ fn policy_bytes(
                 model_hash: model.hash(),
                 discount: model.discount(),
                 method: args.method.to_string(),
-                lower,
+                lower: policy.lower,
                 upper: answer.upper,
                 cpu_s,
                 vectors: vectors.clone(),
@@ -168,7 +207,13 @@ fn policy_bytes(
     }
 }
 
-fn document(args: &Args, model: &Pomdp, answer: &Answer, cpu_s: f64) -> Document {
+fn document(
+    args: &Args,
+    model: &Pomdp,
+    answer: &Answer,
+    policy: Option<&Exported>,
+    cpu_s: f64,
+) -> Document {
     let gap = answer
         .lower
         .zip(answer.upper)
@@ -197,8 +242,10 @@ fn document(args: &Args, model: &Pomdp, answer: &Answer, cpu_s: f64) -> Document
         rounds: answer.progress.rounds,
         beliefs: answer.progress.beliefs,
         points: answer.progress.points,
-        vectors: vectors.map_or(0, vigil_pomdp::AlphaVectors::len),
+        vectors: vectors.map_or(0, AlphaVectors::len),
         policy: args.out.as_ref().map(|out| out.display().to_string()),
+        policy_vectors: policy.map(|policy| policy.vectors.len()),
+        policy_lower: policy.map(|policy| policy.lower),
     }
 }
 
@@ -237,10 +284,14 @@ fn summary(document: &Document) -> String {
         document.method, document.cpu_s, document.ended
     );
     if document.vectors > 0 {
-        let _ = write!(text, "; policy of {} vectors", document.vectors);
+        let _ = write!(text, "; {} vectors", document.vectors);
     }
-    if let Some(policy) = &document.policy {
-        let _ = write!(text, ": {policy}");
+    let few = document.policy_vectors.zip(document.policy_lower);
+    if let Some((policy, (vectors, lower))) = document.policy.as_ref().zip(few) {
+        let _ = write!(
+            text,
+            "\n{policy}: {vectors} vectors, earns {lower:.10} at least"
+        );
     }
     text
 }

@@ -1,0 +1,129 @@
+//! The identifier's belief, over the decision model's states.
+//!
+//! States exclude each other, faults do not: a set of several faults counts once. It belongs to the
+//! state that holds all of its leaves; else to SEVERAL; else, in a model without that, to UNKNOWN,
+//! as no single remedy is one for both. What the sets that are reported leave of a leaf's
+//! probability counts for the leaf.
+//!
+//! States that stand for the same (UNKNOWN and UNKNOWN_OLD) share its probability as the predicted
+//! belief does: the identifier says nothing of a fault's age, the decision model's transitions do.
+//! What has no name is nothing before the fused alarm: the odds of a departure wander on a healthy
+//! robot too, and the alarm alone is calibrated.
+
+use vigil_blocks::{FaultBelief, FaultSet};
+
+use crate::states::{StateMeaning, Subject};
+
+/// A probability may exceed 1 by this much, for rounding. Chosen: far beyond what sums round to.
+/// Smaller might refuse sound input; larger might take damaged input.
+pub(crate) const P_TOLERANCE: f64 = 1e-6;
+
+/// Writes the identifier's belief over the states into `weights`, which need not sum to 1;
+/// `predicted` is the decision model's own belief.
+pub(crate) fn write_weights(
+    diagnosis: &FaultBelief,
+    states: &[StateMeaning],
+    alarm: bool,
+    predicted: &[f64],
+    weights: &mut [f64],
+) {
+    for (weight, meaning) in weights.iter_mut().zip(states) {
+        *weight = probability(diagnosis, *meaning, alarm);
+    }
+    let several = position(states, Subject::Several).or(position(states, Subject::Unknown));
+    for set in sets_of_several(diagnosis) {
+        divide(set, states, several, weights);
+    }
+    share_unknown(states, predicted, weights);
+}
+
+fn position(states: &[StateMeaning], subject: Subject) -> Option<usize> {
+    states.iter().position(|meaning| meaning.subject == subject)
+}
+
+/// Probability of a state; without an alarm, the unknown is nominal. Those of leaves add up, to
+/// more than 1 where they may be present together.
+fn probability(diagnosis: &FaultBelief, meaning: StateMeaning, alarm: bool) -> f64 {
+    match meaning.subject {
+        Subject::Unknown if alarm => diagnosis.p_unknown,
+        Subject::Nominal if !alarm => (diagnosis.p[0] + diagnosis.p_unknown).min(1.0),
+        Subject::Nominal => diagnosis.p[0],
+        Subject::Fault => leaves(diagnosis, meaning).sum(),
+        Subject::Unknown | Subject::Several | Subject::Done => 0.0,
+    }
+}
+
+fn leaves(diagnosis: &FaultBelief, meaning: StateMeaning) -> impl Iterator<Item = f64> {
+    let is_held = move |(leaf, _): &(usize, &f64)| meaning.leaves >> leaf & 1 == 1;
+    let found = diagnosis.p.iter().enumerate().filter(is_held);
+    found.map(|(_, p)| *p)
+}
+
+/// Takes the probability of a set of several faults from its leaves, and gives it to the one state
+/// that it is.
+fn divide(set: &FaultSet, states: &[StateMeaning], several: Option<usize>, weights: &mut [f64]) {
+    for (weight, meaning) in weights.iter_mut().zip(states) {
+        let own = f64::from((set.leaves & meaning.leaves).count_ones());
+        *weight = (*weight - own * set.p).max(0.0);
+    }
+    let holds = |meaning: &StateMeaning| set.leaves & !meaning.leaves == 0;
+    let state = states.iter().position(holds).or(several);
+    if let Some(weight) = state.and_then(|state| weights.get_mut(state)) {
+        *weight += set.p;
+    }
+}
+
+/// Divides the probability of the unknown among its states as `predicted` does; the first has it
+/// all where that holds none of it possible.
+fn share_unknown(states: &[StateMeaning], predicted: &[f64], weights: &mut [f64]) {
+    let is_unknown = |meaning: &StateMeaning| meaning.subject == Subject::Unknown;
+    let of_unknown = || states.iter().zip(predicted).filter(|(m, _)| is_unknown(m));
+    let sum: f64 = of_unknown().map(|(_, b)| b).sum();
+    let mut weight: f64 = 0.0;
+    let shares = weights.iter_mut().zip(states).zip(predicted);
+    let shares = shares.filter(|((_, m), _)| is_unknown(m));
+    for (at, ((share, _), b)) in shares.enumerate() {
+        if at == 0 {
+            weight = *share;
+        }
+        *share = match (sum > 0.0, at) {
+            (true, _) => weight * b / sum,
+            (false, 0) => weight,
+            (false, _) => 0.0,
+        };
+    }
+}
+
+/// Sets in use of two faults or more.
+fn sets_of_several(diagnosis: &FaultBelief) -> impl Iterator<Item = &FaultSet> {
+    reported(diagnosis).filter(|set| set.leaves.count_ones() > 1)
+}
+
+/// The sets in use.
+fn reported(diagnosis: &FaultBelief) -> impl Iterator<Item = &FaultSet> {
+    diagnosis.sets.iter().take(diagnosis.set_count as usize)
+}
+
+/// True if a diagnosis is about the tree with `tree_hash`, and what it says of every state and set
+/// are probabilities, that of some state more than 0.
+pub(crate) fn is_sound(diagnosis: &FaultBelief, states: &[StateMeaning], tree_hash: u64) -> bool {
+    let is_probability = |p: f64| (0.0..=1.0 + P_TOLERANCE).contains(&p);
+    let own = [diagnosis.p[0], diagnosis.p_unknown];
+    let of_leaves = states
+        .iter()
+        .flat_map(|meaning| leaves(diagnosis, *meaning));
+    let of_sets = reported(diagnosis).map(|set| set.p);
+    let are_probabilities = own
+        .into_iter()
+        .chain(of_leaves)
+        .chain(of_sets)
+        .all(is_probability);
+    let sum: f64 = states
+        .iter()
+        .map(|m| probability(diagnosis, *m, true))
+        .sum();
+    are_probabilities && sum > 0.0 && diagnosis.tree_hash == tree_hash
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,206 @@
+//! From the fault tree's leaves to the decision model's states.
+//!
+//! A leaf belongs to the state of its own name; else to that of the nearest node above it; else to
+//! that of its kind in capitals, `STUCK` for `stuck:LF`; else to `FAULT`.
+
+use vigil_pomdp::Pomdp;
+use vigil_robot::{Description, FaultTree};
+
+use crate::error::SupervisorError;
+use crate::mapping::check_size;
+
+/// Name of the decision model's state for deviations that no fault model explains.
+const UNKNOWN: &str = "UNKNOWN";
+/// Name of the same deviation after some time, when waiting for a name has not helped.
+const UNKNOWN_OLD: &str = "UNKNOWN_OLD";
+/// Name of the state of all named faults that have no state of their own. It may be of none.
+const FAULT: &str = "FAULT";
+/// Name of the state of two faults or more.
+const SEVERAL: &str = "SEVERAL";
+/// Name of the state after the end of the task. It is never believed: what goes on has not ended.
+const DONE: &str = "DONE";
+
+/// What a state of the decision model stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Subject {
+    /// Nothing is wrong.
+    Nominal,
+    /// One of some leaves of the fault tree.
+    Fault,
+    /// Two leaves or more.
+    Several,
+    /// What no modelled fault explains.
+    Unknown,
+    /// The task is done.
+    Done,
+}
+
+/// What a state stands for, and which leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct StateMeaning {
+    /// What it stands for.
+    pub subject: Subject,
+    /// Its leaves, as bits.
+    pub leaves: u64,
+}
+
+/// What an action may do about a leaf.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LeafKind {
+    /// A stuck wheel can be counter-steered for.
+    Stuck,
+    /// A broken encoder can be ignored.
+    Encoder,
+    /// Anything else.
+    Other,
+}
+
+/// A leaf of the fault tree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Leaf {
+    /// Index of its node.
+    pub node: usize,
+    /// What may be done about it.
+    pub kind: LeafKind,
+    /// Its wheel.
+    pub wheel: Option<usize>,
+}
+
+/// The leaves of a tree, in order.
+pub(crate) fn leaves(tree: &FaultTree, robot: &Description) -> Vec<Leaf> {
+    let leaf = |node: usize| {
+        let fault = tree.nodes()[node].fault.as_deref().unwrap_or_default();
+        let (kind, part) = fault.split_once(':').unwrap_or((fault, ""));
+        Leaf {
+            node,
+            kind: match kind {
+                "stuck" => LeafKind::Stuck,
+                "encoder" => LeafKind::Encoder,
+                _ => LeafKind::Other,
+            },
+            wheel: robot.wheel_index(part),
+        }
+    };
+    tree.leaves().map(leaf).collect()
+}
+
+/// Meaning of every state, in the model's order.
+///
+/// # Errors
+/// [`SupervisorError`] if a leaf, nominal or unknown has no state, or a state of faults no leaf.
+pub(crate) fn states(
+    model: &Pomdp,
+    tree: &FaultTree,
+) -> Result<Vec<StateMeaning>, SupervisorError> {
+    check_size(model)?;
+    let names = model.states();
+    let nominal = tree.nodes()[0].name.as_str();
+    let meaning = |name: &String| StateMeaning {
+        subject: match name.as_str() {
+            UNKNOWN | UNKNOWN_OLD => Subject::Unknown,
+            SEVERAL => Subject::Several,
+            DONE => Subject::Done,
+            name if name == nominal => Subject::Nominal,
+            _ => Subject::Fault,
+        },
+        leaves: 0,
+    };
+    let mut meanings: Vec<StateMeaning> = names.iter().map(meaning).collect();
+    let is_there = |name: &&str| names.iter().any(|state| state == name);
+    if let Some(missing) = [nominal, UNKNOWN].into_iter().find(|name| !is_there(name)) {
+        return Err(SupervisorError::NoState(missing.to_owned()));
+    }
+    for leaf in tree.leaves() {
+        let holds = |name: &str| {
+            let same = |(state, meaning): (&String, &StateMeaning)| {
+                state == name && meaning.subject == Subject::Fault
+            };
+            names.iter().zip(&meanings).position(same)
+        };
+        let found = candidates(tree, leaf).find_map(|name| holds(&name));
+        let state =
+            found.ok_or_else(|| SupervisorError::NoState(tree.nodes()[leaf].name.clone()))?;
+        meanings[state].leaves |= 1 << leaf;
+    }
+    let is_empty = |(name, meaning): &(&String, &StateMeaning)| {
+        meaning.subject == Subject::Fault && meaning.leaves == 0 && *name != FAULT
+    };
+    match names.iter().zip(&meanings).find(is_empty) {
+        Some((name, _)) => Err(SupervisorError::NoLeaf(name.clone())),
+        None => Ok(meanings),
+    }
+}
+
+/// Names of the states that a leaf may belong to, the first that exists counts.
+fn candidates(tree: &FaultTree, leaf: usize) -> impl Iterator<Item = String> {
+    let node = |at: usize| tree.nodes().get(at);
+    let above = std::iter::successors(node(leaf), move |child| child.parent.and_then(node));
+    let fault = node(leaf).and_then(|leaf| leaf.fault.as_deref());
+    let kind = fault.and_then(|fault| fault.split(':').next());
+    let kind = kind.unwrap_or_default().to_uppercase();
+    above
+        .map(|node| node.name.clone())
+        .chain([kind, FAULT.to_owned()])
+}
+
+#[cfg(test)]
+mod tests {
+    use vigil_robot::tree::Node;
+
+    use super::*;
+
+    fn tree() -> FaultTree {
+        let node = |name: &str, parent, fault: Option<&str>| Node {
+            name: name.to_owned(),
+            parent,
+            fault: fault.map(str::to_owned),
+        };
+        FaultTree::new(vec![
+            node("ND", None, None),
+            node("LEFT", None, None),
+            node("L1", Some(1), Some("stuck:L1")),
+            node("L2", Some(1), Some("stuck:L2")),
+            node("R1", None, Some("stuck:R1")),
+            node("GYRO", None, Some("gyro")),
+        ])
+        .unwrap()
+    }
+
+    /// Leaves of the states with these names.
+    fn held(names: &str) -> Result<Vec<u64>, SupervisorError> {
+        let text =
+            format!("discount: 0.9\nvalues: reward\nstates: {names}\nactions: 1\nT: * identity\n");
+        let meanings = states(&Pomdp::parse(&text).unwrap(), &tree())?;
+        Ok(meanings.iter().map(|meaning| meaning.leaves).collect())
+    }
+
+    #[test]
+    fn a_leaf_belongs_to_the_nearest_state_of_its_own() {
+        for (names, wanted) in [
+            ("ND UNKNOWN L1 L2 R1 GYRO", &[0, 0, 4, 8, 16, 32][..]),
+            ("ND UNKNOWN LEFT R1 GYRO", &[0, 0, 12, 16, 32]),
+            ("ND UNKNOWN LEFT STUCK GYRO", &[0, 0, 12, 16, 32]),
+            ("STUCK UNKNOWN ND L2 FAULT", &[20, 0, 0, 8, 32]),
+            ("ND UNKNOWN FAULT SEVERAL DONE", &[0, 0, 60, 0, 0]),
+            (
+                "ND UNKNOWN UNKNOWN_OLD STUCK GYRO FAULT",
+                &[0, 0, 0, 28, 32, 0],
+            ),
+        ] {
+            assert_eq!(held(names).unwrap(), wanted, "{names}");
+        }
+    }
+
+    #[test]
+    fn leaves_without_a_state_and_states_without_a_leaf_are_named() {
+        let missing = |names: &str| held(names).unwrap_err();
+        let no_state = |name: &str| SupervisorError::NoState(name.to_owned());
+        let no_leaf = |name: &str| SupervisorError::NoLeaf(name.to_owned());
+        assert_eq!(missing("UNKNOWN FAULT"), no_state("ND"));
+        assert_eq!(missing("ND FAULT"), no_state("UNKNOWN"));
+        assert_eq!(missing("ND UNKNOWN LEFT R1"), no_state("GYRO"));
+        assert_eq!(missing("ND UNKNOWN SERVO FAULT"), no_leaf("SERVO"));
+        // Every stuck wheel has a nearer one.
+        assert_eq!(missing("ND UNKNOWN LEFT R1 STUCK GYRO"), no_leaf("STUCK"));
+    }
+}
