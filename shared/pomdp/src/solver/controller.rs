@@ -8,7 +8,8 @@
 
 use std::collections::HashMap;
 
-use super::alphas::{AlphaId, Alphas};
+use super::alphas::AlphaId;
+use super::occupancy::Plan;
 use super::tree::Tree;
 use crate::bounds::SolveError;
 use crate::bounds::linear::{Rows, System};
@@ -18,29 +19,24 @@ use crate::sparse_beliefs::BeliefId;
 /// Largest number of matrix entries. Chosen by hand: solving more takes longer than it narrows.
 const ENTRIES_MAX: usize = 400_000;
 
-/// Takes out the belief with the largest weight; of equal ones the lowest, so that the order of a
-/// hash table never shows.
-pub(super) fn heaviest(weights: &mut HashMap<BeliefId, f64>) -> Option<(BeliefId, f64)> {
-    let mut best: Option<(BeliefId, f64)> = None;
-    for (&id, &weight) in weights.iter() {
-        let is_heavier = best.is_none_or(|(held, most)| {
-            weight > most || (weight.to_bits() == most.to_bits() && id < held)
-        });
-        if is_heavier {
-            best = Some((id, weight));
-        }
-    }
-    if let Some((id, _)) = best {
-        weights.remove(&id);
-    }
-    best
-}
-
 /// Where a plan goes on.
 #[derive(Debug, Clone, Copy)]
 enum Next {
     Part(u32),
     Vector(AlphaId),
+}
+
+/// Beliefs at which a plan is improved at once. Chosen by hand.
+const IMPROVED_MAX: usize = 200;
+
+/// Where a plan goes on after a belief that is not part of the controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Edge {
+    /// With the best vector there.
+    Best,
+    /// With the part whose belief is most like it. So a plan that goes round and round, but never
+    /// through the same belief twice, becomes a circle.
+    Nearest,
 }
 
 /// The beliefs of a controller, their actions and, for each observation, what goes on.
@@ -51,14 +47,17 @@ struct Controller {
 }
 
 impl Tree<'_> {
-    /// Values the controller of the best plan from `root`, and adds its vectors where they are
-    /// better.
+    /// Values the controller of a plan from `root`, and adds its vectors where one is better by
+    /// more than `worthwhile`.
     pub(super) fn value_controller(
         &mut self,
         root: BeliefId,
+        plan: Plan,
+        edge: Edge,
+        worthwhile: f64,
         budget: &mut Budget<'_>,
     ) -> Result<(), StopRequest> {
-        let controller = self.controller(root, budget)?;
+        let controller = self.controller(root, plan, edge, budget)?;
         // The root alone may be too large, or its best plan not looked into yet.
         if controller.parts.is_empty() {
             return Ok(());
@@ -74,7 +73,7 @@ impl Tree<'_> {
             let alpha = &values[part * states..][..states];
             let value: f64 = belief.iter().map(|(s, b)| b * alpha[*s as usize]).sum();
             let before = tree.nodes[controller.parts[part] as usize].lower;
-            value > before + 1e-9 * before.abs().max(1e-3)
+            value > before + worthwhile.max(1e-9 * before.abs().max(1e-3))
         };
         let parts = 0..controller.parts.len();
         if !parts.clone().any(|part| is_better(self, part)) {
@@ -99,82 +98,114 @@ impl Tree<'_> {
         Ok(())
     }
 
-    /// The beliefs that the best plan visits, the most probable first.
+    /// One step of planning, by every action, at the beliefs that the held plan visits most.
+    pub(super) fn improve_held(
+        &mut self,
+        root: BeliefId,
+        budget: &mut Budget<'_>,
+    ) -> Result<(), StopRequest> {
+        let mut visited = self.visited(root, Plan::Held, budget)?;
+        visited.sort_by(|a, b| b.visits.total_cmp(&a.visits).then(a.id.cmp(&b.id)));
+        visited.truncate(IMPROVED_MAX);
+        let is_thorough = std::mem::replace(&mut self.is_thorough, true);
+        for at in visited {
+            self.raise_lower(at.id, budget)?;
+        }
+        self.is_thorough = is_thorough;
+        Ok(())
+    }
+
+    /// The beliefs that a plan visits most.
     fn controller(
         &mut self,
         root: BeliefId,
+        plan: Plan,
+        edge: Edge,
         budget: &mut Budget<'_>,
     ) -> Result<Controller, StopRequest> {
         let states = self.model.states().len();
         let observations = self.model.observations().len();
-        let mut place: HashMap<BeliefId, u32> = HashMap::new();
+        let mut visited = self.visited(root, plan, budget)?;
+        visited.sort_by(|a, b| b.visits.total_cmp(&a.visits).then(a.id.cmp(&b.id)));
+        let mut place = HashMap::new();
         let mut parts = Vec::new();
-        let mut weights: HashMap<BeliefId, f64> = HashMap::from([(root, 1.0)]);
         let mut entries = 0;
-        while let Some((id, weight)) = heaviest(&mut weights) {
-            budget.spend(weights.len())?;
-            if self.nodes[id as usize].branches.is_none() {
-                continue;
-            }
-            self.lower(id, budget)?;
-            let action = self.alphas.action(self.nodes[id as usize].witness);
-            let first = self.branches_of(id, budget)?;
-            if self.branches[first + action].children.is_none() {
-                continue;
-            }
+        for at in visited {
+            let Some(action) = at.action else { continue };
             for s in 0..states {
                 entries += self.model.successors(s, action).len() * observations;
             }
             if entries > ENTRIES_MAX {
                 break;
             }
-            place.insert(id, parts.len() as u32);
-            parts.push(id);
-            for child in self.children_of(id, action, budget)? {
-                let child = self.children[child];
-                if !place.contains_key(&child.node) {
-                    let share = weight * self.model.discount() * child.probability;
-                    *weights.entry(child.node).or_insert(0.0) += share;
-                }
-            }
+            place.insert(at.id, parts.len() as u32);
+            parts.push((at.id, action));
         }
-        self.tie(parts, &place, budget)
+        self.tie(parts, &place, edge, budget)
     }
 
     fn tie(
         &mut self,
-        parts: Vec<BeliefId>,
+        parts: Vec<(BeliefId, usize)>,
         place: &HashMap<BeliefId, u32>,
+        edge: Edge,
         budget: &mut Budget<'_>,
     ) -> Result<Controller, StopRequest> {
-        let mut controller = Controller {
-            actions: Vec::new(),
-            next: Vec::new(),
-            parts,
-        };
-        for id in &controller.parts {
-            let witness = self.nodes[*id as usize].witness;
-            let action = self.alphas.action(witness);
-            let successors = self.alphas.successors(witness).iter();
-            let go_on = |alphas: &Alphas, id: AlphaId| {
-                let part = alphas.origin(id).and_then(|origin| place.get(&origin));
-                part.map_or(Next::Vector(id), |part| Next::Part(*part))
-            };
-            let mut next: Vec<Next> = successors.map(|id| go_on(&self.alphas, *id)).collect();
-            for child in self.children_of(*id, action, budget)? {
+        let mut next = Vec::new();
+        for (id, action) in &parts {
+            // What cannot be observed here goes on as what is most probable.
+            let (mut probable, mut go_on) = ((0.0, Next::Vector(0)), Vec::new());
+            go_on.resize(self.model.observations().len(), None);
+            for child in self.children_of(*id, *action, budget)? {
                 let child = self.children[child];
-                next[child.observation as usize] = match place.get(&child.node) {
-                    Some(part) => Next::Part(*part),
-                    None => {
+                let follows = match (place.get(&child.node), edge) {
+                    (Some(part), _) => Next::Part(*part),
+                    (None, Edge::Nearest) => Next::Part(self.nearest(child.node, &parts, budget)?),
+                    (None, Edge::Best) => {
                         self.lower(child.node, budget)?;
-                        go_on(&self.alphas, self.nodes[child.node as usize].witness)
+                        let witness = self.nodes[child.node as usize].witness;
+                        let origin = self.alphas.origin(witness);
+                        let part = origin.and_then(|origin| place.get(&origin));
+                        part.map_or(Next::Vector(witness), |part| Next::Part(*part))
                     }
                 };
+                if child.probability > probable.0 {
+                    probable = (child.probability, follows);
+                }
+                go_on[child.observation as usize] = Some(follows);
             }
-            controller.actions.push(action);
-            controller.next.extend(next);
+            next.extend(go_on.into_iter().map(|next| next.unwrap_or(probable.1)));
         }
-        Ok(controller)
+        let (parts, actions) = parts.into_iter().unzip();
+        Ok(Controller {
+            parts,
+            actions,
+            next,
+        })
+    }
+
+    /// The part whose belief is most like another.
+    fn nearest(
+        &self,
+        id: BeliefId,
+        parts: &[(BeliefId, usize)],
+        budget: &mut Budget<'_>,
+    ) -> Result<u32, StopRequest> {
+        let mut dense = vec![0.0; self.model.states().len()];
+        for (s, b) in self.beliefs.entries(id) {
+            dense[*s as usize] = *b;
+        }
+        let mut best = (0, 0.0);
+        for (at, (part, _)) in parts.iter().enumerate() {
+            let entries = self.beliefs.entries(*part);
+            // Half the distance of two distributions is 1 less what they share.
+            let shared: f64 = entries.iter().map(|(s, b)| b.min(dense[*s as usize])).sum();
+            budget.spend(entries.len())?;
+            if shared > best.1 {
+                best = (at as u32, shared);
+            }
+        }
+        Ok(best.0)
     }
 
     fn controller_values(
@@ -226,6 +257,11 @@ impl Tree<'_> {
         let error = short / (1.0 - model.discount() * mass_max);
         if error.is_nan() || error < 0.0 {
             return Err(SolveError::Unbounded(model.discount()));
+        }
+        if std::env::var("DBG").is_ok() {
+            let root = self.beliefs.entries(0);
+            let v0: f64 = root.iter().map(|(s, b)| b * values[*s as usize]).sum();
+            eprintln!("controller {} parts, error {error:.3e}, spent {:.2e}, first part value {v0:.2} lower {:.2}", controller.parts.len(), budget.spent() as f64, self.nodes[0].lower);
         }
         values.iter_mut().for_each(|v| *v -= error);
         Ok(values)

@@ -5,18 +5,34 @@
 //! process of their own, whose other beliefs keep the bounds that they have: its optimal values,
 //! found by policy iteration, are upper bounds.
 
+use std::collections::HashMap;
+
 use super::tree::Tree;
 use crate::bounds::SolveError;
 use crate::bounds::linear::{Rows, System};
 use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
+/// Largest number of states with which the corners are part of the process. Chosen by hand.
+const CORNERS_MAX: usize = 256;
+/// Largest number of links to points and corners. Chosen by hand: some 50 MB.
+const LINKS_MAX: usize = 3_000_000;
 /// Largest number of beliefs. Chosen: in a larger tree backups alone lower the bounds. Smaller ends
 /// this help earlier; larger makes one call take longer.
-const BELIEFS_MAX: usize = 20_000;
+const BELIEFS_MAX: usize = 6_000;
 /// Rounds of policy iteration. Chosen: after any round the bounds hold, as what is left of the
 /// error is added to them. Smaller leaves them wider; larger may take longer.
 const ROUNDS_MAX: usize = 20;
+
+/// What stands for the beliefs that are not part of the process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Outside {
+    /// The bounds that they have.
+    Bounds,
+    /// The nearest point and the corners, which are part of it: where a plan goes round and round
+    /// but never through the same belief twice, only so its bounds hold each other down.
+    Points,
+}
 
 /// The process: a choice is one action at one expanded belief.
 struct Choices {
@@ -52,13 +68,55 @@ impl Choices {
 impl Tree<'_> {
     /// Lowers the upper bounds of all expanded beliefs to what they allow each other.
     pub(super) fn lower_all(&mut self, budget: &mut Budget<'_>) -> Result<(), StopRequest> {
-        let ids: Vec<BeliefId> = (0..self.nodes.len() as BeliefId)
-            .filter(|id| self.nodes[*id as usize].branches.is_some())
-            .collect();
+        self.lower_with(Outside::Bounds, budget)?;
+        if self.model.states().len() <= CORNERS_MAX {
+            self.lower_with(Outside::Points, budget)?;
+        }
+        Ok(())
+    }
+
+    /// The beliefs of the process: those that are expanded, or, where points stand for what is
+    /// outside, the points and the corners alone, by every action that may be the best.
+    fn process(
+        &mut self,
+        outside: Outside,
+        budget: &mut Budget<'_>,
+    ) -> Result<Vec<BeliefId>, StopRequest> {
+        if outside == Outside::Bounds {
+            let all = 0..self.nodes.len() as BeliefId;
+            return Ok(all
+                .filter(|id| self.nodes[*id as usize].branches.is_some())
+                .collect());
+        }
+        let mut ids: Vec<BeliefId> = self.sawtooth.beliefs().collect();
+        for state in 0..self.model.states().len() {
+            ids.push(self.node(&[(state as u32, 1.0)], budget)?);
+        }
+        ids.sort_unstable();
+        ids.dedup();
+        if ids.len() > BELIEFS_MAX {
+            return Ok(ids);
+        }
+        for id in &ids {
+            let lower = self.lower(*id, budget)?;
+            let first = self.branches_of(*id, budget)?;
+            for action in 0..self.model.actions().len() {
+                if self.branches[first + action].upper > lower {
+                    self.children_of(*id, action, budget)?;
+                }
+            }
+        }
+        Ok(ids)
+    }
+
+    fn lower_with(&mut self, outside: Outside, budget: &mut Budget<'_>) -> Result<(), StopRequest> {
+        let ids = self.process(outside, budget)?;
         if ids.len() > BELIEFS_MAX {
             return Ok(());
         }
-        let choices = self.choices(&ids, budget)?;
+        let Some(choices) = self.choices(&ids, outside, budget)? else {
+            return Ok(());
+        };
         let guess = ids
             .iter()
             .map(|id| self.nodes[*id as usize].upper)
@@ -68,6 +126,10 @@ impl Tree<'_> {
             Err(SolveError::Stopped) => return Err(StopRequest),
             Err(_) => return Ok(()),
         };
+        if std::env::var("DBG").is_ok() {
+            let gain = ids.iter().zip(&values).filter(|(id, v)| **v < self.nodes[**id as usize].upper).count();
+            eprintln!("grid {outside:?} {} ids, {gain} lower, spent {:.2e}, root {:.2} -> {:.2}", ids.len(), budget.spent() as f64, self.nodes[0].upper, values[0]);
+        }
         for (id, value) in ids.iter().zip(values) {
             let node = &mut self.nodes[*id as usize];
             if value < node.upper - 1e-9 * node.upper.abs() {
@@ -76,16 +138,34 @@ impl Tree<'_> {
                 budget.spend(self.sawtooth.point_count() / 4)?;
             }
         }
+        if outside == Outside::Points {
+            self.lower_corners(budget)?;
+        }
         Ok(())
     }
 
-    /// The process of the expanded beliefs `ids`. A choice whose children are not known leads
-    /// nowhere, and its own upper bound is what it brings.
+    /// Takes what is known of certain states into the planes between them.
+    fn lower_corners(&mut self, budget: &mut Budget<'_>) -> Result<(), StopRequest> {
+        for state in 0..self.model.states().len() {
+            let corner = self.node(&[(state as u32, 1.0)], budget)?;
+            let upper = self.nodes[corner as usize].upper;
+            let before = self.sawtooth.corners()[state];
+            if upper < before - 1e-9 * before.abs() {
+                self.sawtooth.lower_corner(&self.beliefs, state, upper);
+                budget.spend(10 * self.sawtooth.point_count())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The process of the expanded beliefs `ids`; none if it is too large. A choice whose children
+    /// are not known leads nowhere, and its own upper bound is what it brings.
     fn choices(
         &mut self,
         ids: &[BeliefId],
+        outside: Outside,
         budget: &mut Budget<'_>,
-    ) -> Result<Choices, StopRequest> {
+    ) -> Result<Option<Choices>, StopRequest> {
         let mut place = vec![u32::MAX; self.nodes.len()];
         for (at, id) in ids.iter().enumerate() {
             place[*id as usize] = at as u32;
@@ -97,6 +177,8 @@ impl Tree<'_> {
             mass_max: 0.0,
         };
         let discount = self.model.discount();
+        let mut link_count = 0;
+        let mut interpolated = HashMap::new();
         for id in ids {
             let first = self.branches_of(*id, budget)?;
             for branch in first..first + self.model.actions().len() {
@@ -110,15 +192,31 @@ impl Tree<'_> {
                 let mut mass = 0.0;
                 for at in start..start + count {
                     let child = self.children[at as usize];
-                    match place.get(child.node as usize) {
-                        Some(&to) if to != u32::MAX => {
-                            choices.links.push(to as usize, child.probability);
-                            mass += child.probability;
+                    let known = place.get(child.node as usize).filter(|to| **to != u32::MAX);
+                    if let Some(to) = known {
+                        choices.links.push(*to as usize, child.probability);
+                        mass += child.probability;
+                        continue;
+                    }
+                    if outside == Outside::Bounds {
+                        let upper = self.upper(child.node, budget)?;
+                        constant += discount * child.probability * upper;
+                        continue;
+                    }
+                    let parts = match interpolated.get(&child.node) {
+                        Some(parts) => parts,
+                        None => {
+                            let parts = self.interpolation(child.node, &place, budget)?;
+                            interpolated.entry(child.node).or_insert(parts)
                         }
-                        _ => {
-                            let upper = self.upper(child.node, budget)?;
-                            constant += discount * child.probability * upper;
-                        }
+                    };
+                    link_count += parts.len();
+                    for (to, weight) in parts {
+                        choices.links.push(*to, child.probability * weight);
+                        mass += child.probability * weight;
+                    }
+                    if link_count > LINKS_MAX {
+                        return Ok(None);
                     }
                 }
                 choices.constants.push(constant);
@@ -127,7 +225,38 @@ impl Tree<'_> {
             }
             choices.starts.push(choices.constants.len());
         }
-        Ok(choices)
+        Ok(Some(choices))
+    }
+
+    /// A belief as a sum of a point's and of corners: places in the process, with weights.
+    fn interpolation(
+        &mut self,
+        id: BeliefId,
+        place: &[u32],
+        budget: &mut Budget<'_>,
+    ) -> Result<Vec<(usize, f64)>, StopRequest> {
+        let belief = self.beliefs.entries(id).to_vec();
+        let (point, work) = self.sawtooth.closest(&self.beliefs, &belief);
+        budget.spend(work)?;
+        let at = |id: BeliefId| place.get(id as usize).filter(|at| **at != u32::MAX);
+        let mut parts = Vec::new();
+        let mut rest: HashMap<u32, f64> = belief.iter().copied().collect();
+        if let Some((point, c)) = point
+            && let Some(to) = at(point)
+        {
+            parts.push((*to as usize, c));
+            for (s, b) in self.beliefs.entries(point) {
+                rest.entry(*s)
+                    .and_modify(|rest| *rest = (*rest - c * b).max(0.0));
+            }
+        }
+        for (s, _) in belief {
+            let corner = self.node(&[(s, 1.0)], budget)?;
+            if let Some(to) = at(corner) {
+                parts.push((*to as usize, rest.get(&s).copied().unwrap_or(0.0)));
+            }
+        }
+        Ok(parts)
     }
 
     fn grid_values(

@@ -84,6 +84,24 @@ impl Sawtooth {
         fast.min(dot(&self.corners))
     }
 
+    /// Lowers the upper bound where a state is certain. Every point gives less elsewhere, so that
+    /// all are new.
+    pub(super) fn lower_corner(&mut self, beliefs: &SparseBeliefs, state: usize, value: f64) {
+        self.corners[state] = value;
+        self.stamp += 1;
+        for point in &mut self.points {
+            let entries = beliefs.entries(point.belief).iter();
+            let plane = entries.map(|(s, b)| b * self.corners[*s as usize]);
+            point.plane = plane.sum();
+            point.stamp = self.stamp;
+        }
+    }
+
+    /// Upper bounds where the state is certain.
+    pub(super) fn corners(&self) -> &[f64] {
+        &self.corners
+    }
+
     /// Stores or lowers the value of a point.
     pub(super) fn put(&mut self, beliefs: &SparseBeliefs, belief: BeliefId, value: f64) {
         self.stamp += 1;
@@ -119,11 +137,7 @@ impl Sawtooth {
     /// The bound at a belief, at most the value it comes with; and the work done.
     pub(super) fn value(&mut self, beliefs: &SparseBeliefs, query: &Query<'_>) -> (f64, usize) {
         let actions = self.base.rows().len();
-        self.mask.fill(0);
-        for (s, b) in query.entries {
-            self.dense[*s as usize] = *b;
-            self.mask[*s as usize / 64] |= 1 << (s % 64);
-        }
+        self.enter(query.entries);
         let dot = |q: &[f64]| -> f64 {
             let terms = query.entries.iter();
             terms.map(|(s, b)| b * q[*s as usize]).sum()
@@ -164,10 +178,56 @@ impl Sawtooth {
             let value = c * point.value + rest.min(plane - c * point.plane);
             best = best.min(value);
         }
-        for (s, _) in query.entries {
+        self.leave(query.entries);
+        (best, work)
+    }
+
+    /// The point that lowers the plane through the corners most at a belief, with the share c of it
+    /// that the belief holds; and the work done.
+    pub(super) fn closest(
+        &mut self,
+        beliefs: &SparseBeliefs,
+        belief: &[(u32, f64)],
+    ) -> (Option<(BeliefId, f64)>, usize) {
+        self.enter(belief);
+        let (mut best, mut fall_max, mut work) = (None, 0.0, 0);
+        for point in &self.points {
+            work += 2;
+            let masks = self.masks[point.slot as usize * self.words..][..self.words].iter();
+            if masks.zip(&self.mask).any(|(m, q)| m & !q != 0) {
+                continue;
+            }
+            let fall = point.plane - point.value;
+            let mut c = 1.0_f64;
+            for (s, b) in beliefs.entries(point.belief) {
+                c = c.min(self.dense[*s as usize] / b);
+                work += 1;
+                if c * fall <= fall_max {
+                    break;
+                }
+            }
+            if c * fall > fall_max {
+                fall_max = c * fall;
+                best = Some((point.belief, c));
+            }
+        }
+        self.leave(belief);
+        (best, work)
+    }
+
+    /// Makes a belief the one that is being valued.
+    fn enter(&mut self, belief: &[(u32, f64)]) {
+        self.mask.fill(0);
+        for (s, b) in belief {
+            self.dense[*s as usize] = *b;
+            self.mask[*s as usize / 64] |= 1 << (s % 64);
+        }
+    }
+
+    fn leave(&mut self, belief: &[(u32, f64)]) {
+        for (s, _) in belief {
             self.dense[*s as usize] = 0.0;
         }
-        (best, work)
     }
 
     /// Takes out points that the others make superfluous.

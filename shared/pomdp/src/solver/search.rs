@@ -1,5 +1,7 @@
 //! What is done in which order: walks, and now and then what serves all beliefs at once.
 
+use super::controller::Edge;
+use super::occupancy::Plan;
 use super::report::{Bracket, EndReason, Options, Progress};
 use super::tree::Tree;
 use crate::budget::{Budget, StopRequest};
@@ -15,6 +17,9 @@ const EDGE_SHARE: f64 = 0.35;
 /// What is done now and then pays if it narrows the gap by this share. Chosen by hand, as are the
 /// pauses: they decide when a bound is reached, never which.
 const PAYS_SHARE: f64 = 0.01;
+/// A controller's vectors are kept if one is better by this share of what pays. Smaller fills the
+/// memory with vectors that differ by nothing.
+const WORTHWHILE_SHARE: f64 = 1e-3;
 /// Pauses of what is done now and then, in multiples of what it costs.
 const PAUSE_MIN: u64 = 4;
 const PAUSE_START: u64 = 8;
@@ -125,6 +130,7 @@ impl<'m> Search<'m> {
         // A walk follows what is most probable; what is rare is met at the edge.
         let is_edge_due = (self.edge_work as f64) < EDGE_SHARE * began as f64;
         if self.tree.is_thorough || (is_edge_due && self.progress.rounds > 0) {
+            self.tree.walk_from_corner(self.root, budget)?;
             self.tree.advance_frontier(self.root, budget)?;
             self.edge_work += budget.spent() - began;
         } else {
@@ -164,7 +170,11 @@ impl<'m> Search<'m> {
         if began >= self.controller.due {
             let mut value = lower;
             for _ in 0..CONTROLLERS_MAX {
-                tree.value_controller(root, budget)?;
+                let share = WORTHWHILE_SHARE * pays;
+                tree.improve_held(root, budget)?;
+                tree.value_controller(root, Plan::Held, Edge::Best, share, budget)?;
+                tree.value_controller(root, Plan::Promising, Edge::Nearest, share, budget)?;
+                tree.value_controller(root, Plan::Promising, Edge::Best, share, budget)?;
                 let before = std::mem::replace(&mut value, tree.lower(root, budget)?);
                 if value - before <= pays {
                     break;

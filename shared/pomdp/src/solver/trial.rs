@@ -6,7 +6,7 @@ use crate::sparse_beliefs::BeliefId;
 
 /// Longest walk: beyond it a discount below 0.99 leaves nothing of a gap, and nearer to 1 the next
 /// walk goes on.
-const DEPTH_MAX: usize = 2000;
+const DEPTH_MAX: usize = 200;
 
 impl Tree<'_> {
     /// Walks by the most promising action, and by the observation with the largest share in the
