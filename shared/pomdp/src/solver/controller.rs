@@ -258,11 +258,6 @@ impl Tree<'_> {
         if error.is_nan() || error < 0.0 {
             return Err(SolveError::Unbounded(model.discount()));
         }
-        if std::env::var("DBG").is_ok() {
-            let root = self.beliefs.entries(0);
-            let v0: f64 = root.iter().map(|(s, b)| b * values[*s as usize]).sum();
-            eprintln!("controller {} parts, error {error:.3e}, spent {:.2e}, first part value {v0:.2} lower {:.2}", controller.parts.len(), budget.spent() as f64, self.nodes[0].lower);
-        }
         values.iter_mut().for_each(|v| *v -= error);
         Ok(values)
     }

@@ -28,37 +28,6 @@ impl Tree<'_> {
             edge.push((at.visits * self.gap(at.id, budget)?, at.id));
         }
         edge.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        if std::env::var("DBG").is_ok() {
-            let sum: f64 = edge.iter().map(|e| e.0).sum();
-            let top: f64 = edge.iter().take(30).map(|e| e.0).sum();
-            let known: f64 = visited
-                .iter()
-                .filter(|at| at.action.is_some())
-                .map(|at| at.visits)
-                .sum();
-            let out: f64 = visited
-                .iter()
-                .filter(|at| at.action.is_none())
-                .map(|at| at.visits)
-                .sum();
-            eprintln!(
-                "visited {} edge {} share {sum:.3} top30 {top:.3} gap {:.3} known visits {known:.1} out {out:.4}",
-                visited.len(),
-                edge.len(),
-                self.gap(root, budget)?
-            );
-            for (v, id) in edge.iter().take(3) {
-                eprintln!(
-                    "   {v:.4} gap {:.3} {:?}",
-                    self.gap(*id, budget)?,
-                    self.beliefs
-                        .entries(*id)
-                        .iter()
-                        .map(|(s, p)| format!("{}:{p:.3}", self.model.states()[*s as usize]))
-                        .collect::<Vec<_>>()
-                );
-            }
-        }
         edge.truncate(EXPANDED_MAX);
         visited.retain(|at| at.action.is_some());
         visited.truncate(VISITED_MAX);

@@ -126,10 +126,6 @@ impl Tree<'_> {
             Err(SolveError::Stopped) => return Err(StopRequest),
             Err(_) => return Ok(()),
         };
-        if std::env::var("DBG").is_ok() {
-            let gain = ids.iter().zip(&values).filter(|(id, v)| **v < self.nodes[**id as usize].upper).count();
-            eprintln!("grid {outside:?} {} ids, {gain} lower, spent {:.2e}, root {:.2} -> {:.2}", ids.len(), budget.spent() as f64, self.nodes[0].upper, values[0]);
-        }
         for (id, value) in ids.iter().zip(values) {
             let node = &mut self.nodes[*id as usize];
             if value < node.upper - 1e-9 * node.upper.abs() {

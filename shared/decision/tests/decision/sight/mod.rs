@@ -128,7 +128,7 @@ fn odds_without_an_alarm_change_nothing_and_with_one_count_at_once() {
     }
     stages.detection.alarm = 1;
     stages.cycles(1);
-    assert_eq!(stages.world.kind(), RecoveryKind::SlowDown);
+    assert_eq!(stages.world.kind(), RecoveryKind::CallForHelp);
     let action = &stages.world.action;
     assert_eq!((action.alarm, action.alarm_count), (1, 1));
     assert!(stages.world.belief("UNKNOWN") > 0.9);
