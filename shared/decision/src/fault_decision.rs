@@ -1,17 +1,19 @@
 //! Decisions about the leaves of the fault tree: the identifier's belief is the evidence.
 
 use vigil_blocks::{Action, ControlMode, DetectionBelief, FAULT_NODES, FaultBelief, RecoveryKind};
+use vigil_pomdp::policy::Measure;
 use vigil_robot::{Description, FaultTree};
 
 use crate::alarm_fusion::Situation;
 use crate::decision_process::{DecisionProcess, DecisionRule, Instruction};
 use crate::error::SupervisorError;
 use crate::inputs::Inputs;
-use crate::latch::Latch;
+use crate::latch::{Latch, stands};
 use crate::mapping::{self, Compensation};
 use crate::settings::Settings;
 use crate::state_belief::{self, write_weights};
 use crate::states::{self, Leaf, LeafKind, StateMeaning, Subject};
+use crate::switching_cost::SwitchingCost;
 
 /// What the identifier reports about. A change of it opens a decision at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,6 +37,7 @@ pub(crate) struct FaultDecision {
     epoch_t_capture_ns: Option<u64>,
     report: Option<Report>,
     latch: Latch,
+    switching: SwitchingCost,
     instruction: Option<Instruction>,
 }
 
@@ -63,6 +66,7 @@ impl FaultDecision {
             epoch_t_capture_ns: None,
             report: None,
             latch: Latch::default(),
+            switching: SwitchingCost::new(settings.switching_cost),
             instruction: None,
         };
         rule.begin();
@@ -77,7 +81,12 @@ impl FaultDecision {
             *weight = is_nominal(meaning);
         }
         self.process.tracker.anchor(&self.process.scratch);
-        self.decide();
+        self.process.choice = self
+            .process
+            .decider
+            .decide(self.process.tracker.belief())
+            .choice();
+        self.switching.forget();
     }
 
     fn take_diagnosis(&mut self, diagnosis: &FaultBelief, alarm: bool) {
@@ -159,7 +168,13 @@ impl FaultDecision {
 
     fn decide(&mut self) {
         let process = &mut self.process;
-        let best = process.decider.decide(process.tracker.belief()).choice();
+        let mut best = process.decider.decide(process.tracker.belief()).choice();
+        if process.decider.measure() == Measure::Value {
+            let (held, values) = (process.choice.action, process.decider.values());
+            if !self.switching.is_due(held, best.action, values) && best.action != held {
+                best = stands(held);
+            }
+        }
         let actions = &process.actions;
         let kind = |action: usize| actions.get(action).map_or(RecoveryKind::Stop, |m| m.kind);
         process.choice = self.latch.choose(best, kind);

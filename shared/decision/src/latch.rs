@@ -24,7 +24,15 @@ impl Latch {
         if self.action.is_none() && latches {
             self.action = Some(choice.action);
         }
+        self.assert_stands(choice);
         choice
+    }
+
+    fn assert_stands(&self, choice: Choice) {
+        assert!(
+            self.action.is_none_or(|action| action == choice.action),
+            "a latched action stands until a reset: {choice:?}"
+        );
     }
 
     /// The action that stands.
@@ -50,6 +58,12 @@ pub(crate) const fn stands(action: usize) -> Choice {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[should_panic(expected = "a latched action stands until a reset")]
+    fn a_latch_that_is_left_is_caught() {
+        Latch { action: Some(1) }.assert_stands(stands(2));
+    }
 
     #[test]
     fn a_call_and_a_task_given_up_stand_until_they_are_released() {

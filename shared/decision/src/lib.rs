@@ -16,6 +16,7 @@ mod stage_loss;
 mod state_belief;
 mod states;
 mod supervisor;
+mod switching_cost;
 mod symptom_decision;
 
 pub use alarm_fusion::fused_alarm;

@@ -10,7 +10,7 @@ use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
 /// States up to which corners are searched from. Chosen by hand: with more, each matters little.
-const STATES_MAX: usize = 256;
+const STATES_MAX: usize = 128;
 /// A walk from a corner aims at this share of its gap.
 const TARGET_SHARE: f64 = 0.5;
 /// A corner is lowered where that takes this share of its gap: all points have to be looked at anew.

@@ -12,9 +12,8 @@ const COMPARISONS_MAX: usize = 5_000_000;
 const UNBEATEN_MAX: usize = 2_000_000;
 
 impl Tree<'_> {
-    /// The vectors that a policy needs: those that are looked at, and the plan from `root` with
-    /// all that it goes on to, so that the policy keeps what the lower bound promises. Where a
-    /// plan goes on to a vector that another one beats in every state, that one does instead; what
+    /// The vectors that a policy needs: those that are looked at, the plan from `root`, and all that
+    /// these go on to, so that a policy earns at least what its vectors say. Where a plan goes on to a vector that another one beats in every state, that one does instead; what
     /// is beaten so is left out. An action that is never the best may be without a vector.
     pub(super) fn vectors(&self, root: BeliefId) -> Result<AlphaVectors, VectorError> {
         let actions = self.model.actions().len();
@@ -24,7 +23,8 @@ impl Tree<'_> {
         let mut is_closed = is_settled.clone();
         needed.iter().for_each(|id| is_settled[*id as usize] = true);
         let mut comparisons = 0;
-        let mut open: Vec<AlphaId> = vec![self.nodes[root as usize].witness];
+        let mut open = needed.clone();
+        open.push(self.nodes[root as usize].witness);
         while let Some(id) = open.pop() {
             let mut stands = id;
             if !std::mem::replace(&mut is_settled[id as usize], true) {

@@ -14,7 +14,7 @@ use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
 /// Largest number of states with which the corners are part of the process. Chosen by hand.
-const CORNERS_MAX: usize = 256;
+const CORNERS_MAX: usize = 128;
 /// Largest number of links to points and corners. Chosen by hand: some 50 MB.
 const LINKS_MAX: usize = 3_000_000;
 /// Largest number of beliefs. Chosen: in a larger tree backups alone lower the bounds. Smaller ends

@@ -8,12 +8,14 @@
 //!   informed bound (`sawtooth`);
 //! - beliefs that were reached twice share a node, know which vectors and points they have seen,
 //!   and are never valued by the same one twice (`tree`);
-//! - from time to time the best plan is tied into a controller and valued exactly (`controller`),
-//!   and the expanded beliefs are valued together (`grid`), so that a discount near 1 does not
-//!   slow either bound down;
-//! - rounds at the edge of the graph (`frontier`) have a share of the work, and all of it where
-//!   walks go round in circles: a walk follows the most probable observation again and again, even
-//!   where what is worth knowing is rare.
+//! - from time to time the best plans are tied into controllers and valued exactly (`controller`),
+//!   and the expanded beliefs are valued together, then the points and certain states by
+//!   themselves (`grid`), so that a discount near 1 does not slow either bound down;
+//! - rounds at the edge of the graph (`frontier`) and from certain states (`corners`) have a share
+//!   of the work, and all of it where walks go round in circles: a walk follows the most probable
+//!   observation again and again, even where what is worth knowing is rare. What matters there
+//!   follows from how often a plan visits each belief (`occupancy`);
+//! - a small policy is chosen from the vectors (`compact`).
 //!
 //! The same model and precision give the same vectors, unless time or memory ended the search.
 

@@ -36,6 +36,7 @@ pub(super) struct Search<'m> {
     pub root: BeliefId,
     pub progress: Progress,
     controller: Rhythm,
+    improvement: Rhythm,
     grid: Rhythm,
     /// Elementary operations of rounds at the edge of the graph.
     edge_work: u64,
@@ -89,6 +90,7 @@ impl<'m> Search<'m> {
             root,
             progress: Progress::default(),
             controller: Rhythm::new(),
+            improvement: Rhythm::new(),
             grid: Rhythm::new(),
             edge_work: 0,
             rounding,
@@ -162,27 +164,42 @@ impl<'m> Search<'m> {
         Ok(())
     }
 
+    /// Ties plans into controllers while that pays and is no large part of the work. Returns the
+    /// lower bound then.
+    fn tie_controllers(&mut self, pays: f64, budget: &mut Budget<'_>) -> Result<f64, StopRequest> {
+        let (tree, root, began) = (&mut self.tree, self.root, budget.spent());
+        let mut value = tree.lower(root, budget)?;
+        let share = WORTHWHILE_SHARE * pays;
+        for _ in 0..CONTROLLERS_MAX {
+            tree.value_controller(root, Plan::Held, Edge::Best, share, budget)?;
+            tree.value_controller(root, Plan::Promising, Edge::Nearest, share, budget)?;
+            tree.value_controller(root, Plan::Promising, Edge::Best, share, budget)?;
+            let before = std::mem::replace(&mut value, tree.lower(root, budget)?);
+            if value - before <= pays || budget.spent() - began > began / PAUSE_MIN {
+                break;
+            }
+        }
+        Ok(value)
+    }
+
     fn now_and_then(&mut self, budget: &mut Budget<'_>) -> Result<(), StopRequest> {
         let (tree, root) = (&mut self.tree, self.root);
         let (lower, upper) = (tree.lower(root, budget)?, tree.upper(root, budget)?);
         let pays = PAYS_SHARE * (upper - lower);
         let began = budget.spent();
         if began >= self.controller.due {
-            let mut value = lower;
-            for _ in 0..CONTROLLERS_MAX {
-                let share = WORTHWHILE_SHARE * pays;
-                tree.improve_held(root, budget)?;
-                tree.value_controller(root, Plan::Held, Edge::Best, share, budget)?;
-                tree.value_controller(root, Plan::Promising, Edge::Nearest, share, budget)?;
-                tree.value_controller(root, Plan::Promising, Edge::Best, share, budget)?;
-                let before = std::mem::replace(&mut value, tree.lower(root, budget)?);
-                if value - before <= pays {
-                    break;
-                }
-            }
-            self.controller
-                .done(began, budget.spent(), value - lower > pays);
+            let value = self.tie_controllers(pays, budget)?;
+            let is_better = value - lower > pays;
+            self.controller.done(began, budget.spent(), is_better);
         }
+        let began = budget.spent();
+        if began >= self.improvement.due {
+            let lower = self.tree.lower(root, budget)?;
+            self.tree.improve_held(root, budget)?;
+            let is_better = self.tie_controllers(pays, budget)? - lower > pays;
+            self.improvement.done(began, budget.spent(), is_better);
+        }
+        let tree = &mut self.tree;
         let began = budget.spent();
         if began >= self.grid.due {
             tree.lower_all(budget)?;

@@ -3,14 +3,13 @@
 use std::fmt::Write as _;
 
 use proptest::prelude::*;
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64Mcg;
 use vigil_pomdp::bounds::{blind, fib, tib};
 use vigil_pomdp::solver::{EndReason, Options, Progress, SearchResult, solve};
-use vigil_pomdp::{Budget, Evidence, PointBased, Policy, Pomdp, Tracker};
+use vigil_pomdp::{Budget, Pomdp};
 
 use crate::public;
 use crate::public::TIGER;
+use crate::simulation::earned;
 
 /// A dense model from weights; `order` permutes its states.
 #[derive(Debug, Clone)]
@@ -114,18 +113,8 @@ fn exhaustive(model: &Pomdp, belief: &[f64], depth: usize) -> f64 {
     best
 }
 
-/// The entry at which the sum of the probabilities exceeds u.
-fn pick(u: f64, probabilities: impl IntoIterator<Item = f64>) -> usize {
-    let mut sum = 0.0;
-    let exceeds = |p| {
-        sum += p;
-        u < sum
-    };
-    probabilities.into_iter().position(exceeds).unwrap()
-}
-
 /// Solves; the budget ends after so many questions.
-fn solved(model: &Pomdp, precision: f64, questions: usize) -> (SearchResult, Vec<Progress>) {
+pub fn solved(model: &Pomdp, precision: f64, questions: usize) -> (SearchResult, Vec<Progress>) {
     let mut left = questions;
     let mut stop = || {
         left = left.saturating_sub(1);
@@ -176,30 +165,8 @@ fn a_simulated_policy_earns_the_lower_bound() {
     let model = Pomdp::parse(TIGER).unwrap();
     let (found, _) = solved(&model, 0.1, usize::MAX);
     let vectors = found.vectors.clone().unwrap();
-    let policy = &mut PointBased::new(&model, &vectors).unwrap();
     assert!((vectors.value(model.start()) - found.bracket.lower).abs() < 1e-6);
-    let mut rng = Pcg64Mcg::seed_from_u64(5);
-    let earned: Vec<f64> = (0..2000)
-        .map(|_| {
-            let mut tracker = Tracker::new(&model);
-            let mut state = pick(rng.random(), model.start().iter().copied());
-            let (mut sum, mut weight, mut values) = (0.0, 1.0, [0.0; 3]);
-            while weight > 1e-4 {
-                let a = policy.evaluate(tracker.belief(), &mut values).action;
-                sum += weight * model.reward(state, a);
-                weight *= model.discount();
-                let row = model.successors(state, a);
-                state = row[pick(rng.random(), row.iter().map(|r| r.1))].0;
-                let seen = (0..2).map(|o| model.likelihood(a, o)[state]);
-                let o = pick(rng.random(), seen);
-                assert!(matches!(tracker.update(&model, a, o), Evidence::Taken(_)));
-            }
-            sum
-        })
-        .collect();
-    let mean = earned.iter().sum::<f64>() / 2000.0;
-    let variance = earned.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / 1999.0;
-    let sigma = (variance / 2000.0).sqrt();
+    let (mean, sigma) = earned(&model, &vectors, 2000, 1e-4);
     // What is cut off after the last step: at most 1e-4 of 200.
     assert!(
         mean >= found.bracket.lower - 3.0 * sigma - 0.02,

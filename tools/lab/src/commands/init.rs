@@ -10,14 +10,16 @@ use vigil_terminal::{CommandError, Outcome, output};
 
 use crate::commands::files::write_whole;
 
-/// What to do about a fault of any robot.
+/// What to do about a fault of any robot: parameters, the model that follows, its policy.
+const RECOVERY: &str = include_str!("../../../../config/any-robot.recovery.toml");
 const DECISION: &str = include_str!("../../../../config/any-robot.pomdp");
+const POLICY: &str = include_str!("../../../../config/any-robot.policy.json");
 /// The fault tree that follows from the robot's description.
 const TREE: &str = include_str!("../../../../config/trees/generated.toml");
 /// Rate of a graph whose log is not known, Hz.
 const RATE_HZ: f64 = 20.0;
 
-/// Writes the files of a new robot into a folder: graph, robot, fault tree, decision model.
+/// Writes the files of a new robot into a folder: graph, robot, fault tree, decision model, policy.
 ///
 /// From a log it also writes how that is read, and describes the robot as far as the log shows it.
 #[derive(Debug, clap::Args)]
@@ -68,7 +70,9 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         ("graph.toml", graph(&name, new.rate_hz)),
         ("robot.toml", new.robot),
         ("tree.toml", TREE.to_owned()),
+        ("recovery.toml", recovery(&args.folder)),
         ("decision.pomdp", DECISION.to_owned()),
+        ("decision.policy.json", POLICY.to_owned()),
     ];
     let from = new.log.map(|(text, from)| {
         files.push(("log.toml", text));
@@ -138,6 +142,16 @@ fn from_robot(path: &Path) -> Result<NewRobot, CommandError> {
     })
 }
 
+/// The parameters, with the commands for this folder's files.
+fn recovery(folder: &Path) -> String {
+    let of = |file: &str| folder.join(file).display().to_string();
+    RECOVERY
+        .replace("config/any-robot.recovery.toml", &of("recovery.toml"))
+        .replace("config/any-robot.policy.json", &of("decision.policy.json"))
+        .replace("config/any-robot.pomdp", &of("decision.pomdp"))
+        .replace("any-robot.pomdp", "decision.pomdp")
+}
+
 /// Two neighbours share a core; on four or more each has its own.
 fn graph(name: &str, rate_hz: f64) -> String {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
@@ -175,8 +189,11 @@ source = "external"
 false_alarm_interval_h = 24.0
 fault_rate_1_h = 1.0
 
+# Model and policy are made from recovery.toml, which says how.
 [supervisor]
-policy = "qmdp"
+policy = "point-based"
+policy_file = "decision.policy.json"
+switching_cost = 1.0
 epoch_ms = 100.0
 validity_periods = 10.0
 

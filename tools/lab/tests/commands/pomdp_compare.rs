@@ -309,5 +309,5 @@ fn options_that_mean_nothing_are_refused_with_what_is_allowed() {
         assert!(message.contains(part), "{part}: {message}");
     }
     assert!(refused(&["compare", "config/none.pomdp"]).contains("No such file"));
-    assert!(refused(&["generate", "config/rover.toml"]).contains("unknown field"));
+    assert!(refused(&["generate", "config/rover.toml"]).contains("missing field `model`"));
 }

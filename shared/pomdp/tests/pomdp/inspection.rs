@@ -1,0 +1,128 @@
+//! Deep inspection: cheap repeated tests before an act that is dear to get wrong.
+
+use std::fmt::Write as _;
+
+use vigil_pomdp::Budget;
+use vigil_pomdp::Pomdp;
+use vigil_pomdp::solver::{EndReason, compact};
+
+use crate::public::{self, TIGER};
+use crate::simulation::earned;
+use crate::solver::solved;
+
+/// A part is good or bad; each look costs `LOOK` and is right with `RIGHT`; using a bad one is dear.
+fn part(discount: f64) -> Pomdp {
+    let text = format!(
+        "discount: {discount:?}\nstates: good bad gone\nactions: look use leave\n\
+         observations: plus minus\nstart: 0.5 0.5 0\n\
+         T: look identity\nT: use : * : gone 1\nT: leave : * : gone 1\n\
+         O: * uniform\nO: look : good\n{RIGHT} {wrong}\nO: look : bad\n{wrong} {RIGHT}\n\
+         R: look : good : * : * {look}\nR: look : bad : * : * {look}\n\
+         R: use : good : * : * 10\nR: use : bad : * : * -100\n",
+        wrong = 1.0 - RIGHT,
+        look = -LOOK
+    );
+    Pomdp::parse(&text).unwrap()
+}
+
+const RIGHT: f64 = 0.75;
+const LOOK: f64 = 0.1;
+
+/// The value of `part`, by value iteration over what matters: how many more looks said good.
+fn value_of_part(discount: f64) -> f64 {
+    const MOST: usize = 40;
+    let p = |at: usize| {
+        let odds = ((1.0 - RIGHT) / RIGHT).powi(at as i32 - MOST as i32);
+        1.0 / (1.0 + odds)
+    };
+    let use_it = |at: usize| 110.0 * p(at) - 100.0;
+    let mut values = vec![0.0; 2 * MOST + 1];
+    for _ in 0..10_000 {
+        let before = values.clone();
+        for (at, value) in values.iter_mut().enumerate() {
+            let plus = p(at) * RIGHT + (1.0 - p(at)) * (1.0 - RIGHT);
+            let up = before[(at + 1).min(2 * MOST)];
+            let down = before[at.saturating_sub(1)];
+            let look = discount * (plus * up + (1.0 - plus) * down) - LOOK;
+            *value = look.max(use_it(at)).max(0.0);
+        }
+    }
+    values[MOST]
+}
+
+/// One of `n` parts is broken. A test of one is noisy and cheap; the wrong repair is dear; after any
+/// repair another part breaks.
+fn repairs(n: usize, discount: f64) -> Pomdp {
+    let all = |name: &str| (0..n).map(|i| format!(" {name}{i}")).collect::<String>();
+    let (states, tests, fixes) = (all("part"), all("test"), all("fix"));
+    let mut text = format!(
+        "discount: {discount:?}\nstates:{states}\nactions:{tests}{fixes}\n\
+         observations: yes no\nT: * uniform\nO: * uniform\nR: * : * : * : * -50\n"
+    );
+    for i in 0..n {
+        write!(
+            text,
+            "T: test{i} identity\nO: test{i} : * : yes 0.2\nO: test{i} : * : no 0.8\n\
+             O: test{i} : part{i} : yes 0.8\nO: test{i} : part{i} : no 0.2\n\
+             R: test{i} : * : * : * -1\nR: fix{i} : part{i} : * : * 20\n"
+        )
+        .unwrap();
+    }
+    Pomdp::parse(&text).unwrap()
+}
+
+#[test]
+fn looks_before_an_act_are_worth_what_counting_them_says() {
+    for discount in [0.95, 0.99, 0.999, 0.9999] {
+        let wanted = value_of_part(discount);
+        let (found, _) = solved(&part(discount), 1e-5, 40_000);
+        let bracket = found.bracket;
+        assert_eq!(found.ended, EndReason::Precision, "{discount}: {bracket:?}");
+        let (lower, upper) = (bracket.lower - 1e-9, bracket.upper + 1e-9);
+        assert!((lower..=upper).contains(&wanted), "{wanted}: {bracket:?}");
+    }
+}
+
+#[test]
+fn acts_again_and_again_are_solved_at_every_discount() {
+    for discount in [0.95, 0.99, 0.999, 0.9999] {
+        let (found, _) = solved(&repairs(3, discount), 1e-6 / (1.0 - discount), 100_000);
+        assert_eq!(found.ended, EndReason::Precision, "{:?}", found.bracket);
+    }
+    // An average of a reward a step does not depend on the discount by more than one repair.
+    let values = [0.999, 0.9999].map(|discount| {
+        let (found, _) = solved(&repairs(3, discount), 1e-3, 100_000);
+        found.bracket.lower * (1.0 - discount)
+    });
+    assert!((values[0] - values[1]).abs() < 20.0 * 1e-3, "{values:?}");
+}
+
+#[test]
+fn a_policy_of_few_vectors_earns_what_is_said_of_it() {
+    let tiger = Pomdp::parse(TIGER).unwrap();
+    let mut models = vec![("tiger", tiger, 9), ("repairs", repairs(4, 0.95), 60)];
+    if let Some(folder) = public::folder() {
+        models.push(("hallway", public::read(&folder, "hallway"), 60));
+    }
+    for (name, model, most) in models {
+        let (found, _) = solved(&model, 1e-3, 20_000);
+        let all = found.vectors.unwrap();
+        let mut never = || false;
+        let mut small = |most| compact(&model, &all, most, &mut Budget::new(&mut never)).unwrap();
+        let few = small(most);
+        assert!(few.vectors.len() <= most, "{name}");
+        assert_eq!(few, small(most));
+        let promised = all.value(model.start()) - few.loss_mean;
+        let (mean, error) = earned(&model, &few.vectors, 2000, 1e-3);
+        let rest = 1e-3 * 100.0 / (1.0 - model.discount());
+        let error = error.hypot(few.loss_error);
+        assert!(
+            mean >= promised - 3.0 * error - rest,
+            "{name}: {mean} {promised} {error}"
+        );
+        // Fewer are worth less, or as much.
+        let fewer = small(2);
+        assert!(fewer.vectors.len() <= 2);
+        assert!(fewer.loss_mean >= few.loss_mean - 3.0 * error, "{name}");
+    }
+}
