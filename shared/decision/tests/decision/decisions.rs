@@ -95,6 +95,26 @@ fn a_fault_that_has_cleared_lets_the_rover_go_on() {
 }
 
 #[test]
+fn evidence_that_comes_and_goes_does_not_toggle_actions() {
+    let decisions = |switching_cost: f64| {
+        let mut world = World::with(|settings| settings.switching_cost = switching_cost);
+        // Twice a second the identifier thinks otherwise, for a minute.
+        for _ in 0..120 {
+            world.rest(25, true, &[("ND", 0.7), ("RM_STUCK", 0.3)]);
+            world.rest(25, true, &[("ND", 0.9), ("RM_STUCK", 0.1)]);
+        }
+        (world.action.decision_seq, world.kind())
+    };
+    assert!(decisions(0.0).0 > 200);
+    assert_eq!(decisions(2.0), (2, RecoveryKind::SlowDown));
+    // What is much better is done at once.
+    let mut world = World::with(|settings| settings.switching_cost = 2.0);
+    world.rest(50, false, &[("ND", 1.0)]);
+    world.cycle(true, &[("RM_STUCK", 1.0)], &[]);
+    assert_eq!(world.kind(), RecoveryKind::Compensate);
+}
+
+#[test]
 fn faults_of_two_states_are_unknown_to_a_model_that_has_no_state_of_several() {
     let mut world = World::new();
     let both = [

@@ -3,7 +3,7 @@
 use vigil_blocks::{
     Blindness, CauseKind, ControlMode, DetectionBelief, Entry, FaultBelief, Readiness, RecoveryKind,
 };
-use vigil_decision::{Inputs, Settings};
+use vigil_decision::Inputs;
 
 use crate::world::{CYCLE_NS, World};
 
@@ -16,11 +16,7 @@ struct Stages {
 
 impl Stages {
     fn new() -> Self {
-        Self::with(|_| {})
-    }
-
-    fn with(change: impl FnOnce(&mut Settings)) -> Self {
-        let world = World::with(change);
+        let world = World::new();
         let mut diagnosis = FaultBelief {
             tree_hash: world.tree.hash(),
             ..FaultBelief::default()
@@ -136,31 +132,6 @@ fn odds_without_an_alarm_change_nothing_and_with_one_count_at_once() {
     let action = &stages.world.action;
     assert_eq!((action.alarm, action.alarm_count), (1, 1));
     assert!(stages.world.belief("UNKNOWN") > 0.9);
-}
-
-#[test]
-fn evidence_that_comes_and_goes_does_not_toggle_actions() {
-    let decisions = |switching_cost: f64| {
-        let mut stages = Stages::with(|settings| settings.switching_cost = switching_cost);
-        stages.detection.alarm = 1;
-        stages.p_fault(0.0);
-        stages.cycles(20);
-        // Twice a second the identifier thinks otherwise, for a minute.
-        for k in 0..120 {
-            stages.p_fault([0.2, 0.05][k % 2]);
-            stages.cycles(25);
-        }
-        stages.world.action.decision_seq
-    };
-    assert!(decisions(0.0) > 100);
-    assert!(decisions(2.0) <= 3, "{}", decisions(2.0));
-    // What is much better is done at once.
-    let mut stages = Stages::with(|settings| settings.switching_cost = 2.0);
-    stages.cycles(20);
-    stages.detection.alarm = 1;
-    stages.p_fault(0.99);
-    stages.cycles(1);
-    assert_eq!(stages.world.kind(), RecoveryKind::CallForHelp);
 }
 
 #[test]
