@@ -1,8 +1,8 @@
 //! The identifier's belief, over the decision model's states.
 //!
-//! States exclude each other, faults do not: a set of several faults counts once. It belongs to the
-//! state that holds all of its leaves; else to SEVERAL; else, in a model without that, to UNKNOWN,
-//! as no single remedy is one for both. What the sets that are reported leave of a leaf's
+//! States exclude each other, faults do not: a set of several faults counts once. It belongs to
+//! SEVERAL: an action compensates one wheel, and ignores one encoder. In a model without that state
+//! it belongs to the one that holds all of its leaves; else to UNKNOWN. What the sets that are reported leave of a leaf's
 //! probability counts for the leaf.
 //!
 //! States that stand for the same (UNKNOWN and UNKNOWN_OLD) share its probability as the predicted
@@ -30,7 +30,7 @@ pub(crate) fn write_weights(
     for (weight, meaning) in weights.iter_mut().zip(states) {
         *weight = probability(diagnosis, *meaning, alarm);
     }
-    let several = position(states, Subject::Several).or(position(states, Subject::Unknown));
+    let several = position(states, Subject::Several);
     for set in sets_of_several(diagnosis) {
         divide(set, states, several, weights);
     }
@@ -67,7 +67,9 @@ fn divide(set: &FaultSet, states: &[StateMeaning], several: Option<usize>, weigh
         *weight = (*weight - own * set.p).max(0.0);
     }
     let holds = |meaning: &StateMeaning| set.leaves & !meaning.leaves == 0;
-    let state = states.iter().position(holds).or(several);
+    let state = several
+        .or_else(|| states.iter().position(holds))
+        .or_else(|| position(states, Subject::Unknown));
     if let Some(weight) = state.and_then(|state| weights.get_mut(state)) {
         *weight += set.p;
     }
