@@ -2,9 +2,8 @@
 
 use std::fmt::Write as _;
 
-use vigil_pomdp::Budget;
-use vigil_pomdp::Pomdp;
-use vigil_pomdp::solver::{EndReason, compact};
+use vigil_pomdp::solver::{EndReason, compact, policy_value};
+use vigil_pomdp::{Budget, Choice, Control, PointBased, Policy, Pomdp, QMdp, mdp};
 
 use crate::public::{self, TIGER};
 use crate::simulation::earned;
@@ -125,4 +124,63 @@ fn a_policy_of_few_vectors_earns_what_is_said_of_it() {
         assert!(fewer.vectors.len() <= 2);
         assert!(fewer.loss_mean >= few.loss_mean - 3.0 * error, "{name}");
     }
+}
+
+/// One action for ever.
+struct Always(usize);
+
+impl Policy for Always {
+    fn evaluate(&mut self, _: &[f64], _: &mut [f64]) -> Choice {
+        Choice {
+            action: self.0,
+            margin: 0.0,
+            control: Control::Policy,
+        }
+    }
+}
+
+#[test]
+fn what_a_policy_earns_lies_between_its_bounds() {
+    let mut never = || false;
+    let mut budget = Budget::new(&mut never);
+    // To listen for ever: -20; one belief after another, as many as are heard more on one side.
+    let tiger = Pomdp::parse(TIGER).unwrap();
+    let listen = &mut Always(0);
+    for beliefs_max in [1, 10, 1000] {
+        let found = policy_value(&tiger, listen, beliefs_max, &mut budget).unwrap();
+        assert!(found.beliefs <= beliefs_max && found.lower <= -20.0 && -20.0 <= found.upper);
+        assert!((found.beyond > 1e-3) == (beliefs_max < 1000), "{found:?}");
+    }
+    // The best policy visits five beliefs.
+    let (best, _) = solved(&tiger, 1e-9, 20_000);
+    let mut policy = PointBased::new(&tiger, &best.vectors.unwrap()).unwrap();
+    let found = policy_value(&tiger, &mut policy, 100, &mut budget).unwrap();
+    assert_eq!((found.beliefs, found.beyond), (5, 0.0));
+    assert!((found.lower - 19.371_368_38).abs() < 1e-6 && found.upper - found.lower < 1e-9);
+    // One that is not the best, and its simulation.
+    let model = repairs(3, 0.95);
+    let few = compact(
+        &model,
+        &solved(&model, 1e-3, 20_000).0.vectors.unwrap(),
+        4,
+        &mut budget,
+    );
+    let few = few.unwrap().vectors;
+    let mut policy = PointBased::new(&model, &few).unwrap();
+    let found = policy_value(&model, &mut policy, 20_000, &mut budget).unwrap();
+    let (mean, error) = earned(&model, &few, 4000, 1e-4);
+    assert!(found.upper - found.lower < 1e-2, "{found:?}");
+    assert!(
+        (mean - found.lower).abs() < 4.0 * error + 0.2,
+        "{mean} {error} {found:?}"
+    );
+    // A policy that acts as if it knew more than it will.
+    let mut heuristic = QMdp::new(mdp::solve(&model).unwrap());
+    let found = policy_value(&model, &mut heuristic, 20_000, &mut budget).unwrap();
+    assert!(
+        found.upper < solved(&model, 1e-3, 20_000).0.bracket.lower,
+        "{found:?}"
+    );
+    let endless = Pomdp::parse(&TIGER.replace("0.95", "1")).unwrap();
+    assert!(policy_value(&endless, listen, 10, &mut budget).is_err());
 }

@@ -134,3 +134,36 @@ fn wrong_options_are_refused() {
         assert!(text.contains(part), "{options:?}: {text}");
     }
 }
+
+#[test]
+fn a_policys_value_is_bounded_and_sampled() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (file, policy) = (path("tiger.pomdp"), path("tiger.json"));
+    fs::write(&file, TIGER).unwrap();
+    let solved = document(&[&file, "--precision", "1e-6", "--out", &policy]);
+    let value = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_vigil-lab"));
+        command.args(["pomdp", "value", &file, &policy]);
+        command.args(arguments).output().unwrap()
+    };
+    let output = value(&["--json"]);
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let number = |key: &str| found[key].as_f64().unwrap();
+    assert!(
+        (number("lower") - solved["policy_lower"].as_f64().unwrap()).abs() < 1e-5,
+        "{found}"
+    );
+    assert!(number("upper") - number("lower") < 1e-6);
+    assert_eq!((number("beyond_share"), number("beliefs")), (0.0, 5.0));
+    let distance = (number("mean") - number("lower")).abs();
+    assert!(distance < 2.0 * number("half_width_95"), "{found}");
+    let text = String::from_utf8(value(&["--episodes", "10"]).stdout).unwrap();
+    assert!(
+        text.contains("for certain: 5 beliefs") && text.contains("10 missions of"),
+        "{text}"
+    );
+    fs::write(&policy, "{}").unwrap();
+    let refused = value(&[]);
+    assert_eq!(refused.status.code(), Some(2), "{refused:?}");
+}

@@ -13,6 +13,7 @@ mod simulate;
 mod solve;
 mod solved;
 mod track;
+mod value;
 
 use std::path::Path;
 
@@ -39,6 +40,7 @@ enum Command {
     Track(track::Args),
     Convert(convert::Args),
     Solve(solve::Args),
+    Value(value::Args),
 }
 
 /// Does what the subcommand says.
@@ -56,6 +58,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         Command::Track(args) => track::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Solve(args) => solve::run(args),
+        Command::Value(args) => value::run(args),
     }
 }
 

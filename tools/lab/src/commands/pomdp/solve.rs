@@ -13,8 +13,7 @@ use vigil_pomdp::{AlphaVectors, Budget, Pomdp};
 use super::{load, print, save};
 use vigil_terminal::{CommandError, Outcome};
 
-/// Memory at which the search ends, bytes.
-const MEMORY_BYTES_MAX: usize = 3 << 30;
+const BYTES_PER_GIB: f64 = (1_u64 << 30) as f64;
 /// Standard errors by which what a small policy loses is thought to be more than in the sample.
 const LOSS_ERRORS: f64 = 4.0;
 /// Progress is printed when this factor of time has passed since the last line.
@@ -51,6 +50,14 @@ pub struct Args {
         allow_negative_numbers = true
     )]
     precision: f64,
+    /// Memory at which sarsop ends, GiB.
+    #[arg(
+        long,
+        value_name = "GIB",
+        default_value_t = 3.0,
+        allow_negative_numbers = true
+    )]
+    memory: f64,
     /// Where to write the policy. The name decides the format: `.policy` is APPL's, `.alpha` is
     /// pomdp-solve's, any other is Vigil's own, which `supervisor.policy_file` takes.
     #[arg(long, value_name = "POLICY")]
@@ -106,7 +113,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let mut budget = Budget::new(&mut stop);
     let options = Options {
         precision: args.precision,
-        memory_bytes_max: MEMORY_BYTES_MAX,
+        memory_bytes_max: (args.memory * BYTES_PER_GIB) as usize,
     };
     let mut next_s = PROGRESS_FIRST_S;
     let watch = &mut |progress: &Progress| {
@@ -162,7 +169,11 @@ fn policy(args: &Args, model: &Pomdp, answer: &Answer) -> Result<Exported, Comma
 }
 
 fn check(args: &Args) -> Result<(), CommandError> {
-    let numbers = [("--timeout", args.timeout), ("--precision", args.precision)];
+    let numbers = [
+        ("--timeout", args.timeout),
+        ("--precision", args.precision),
+        ("--memory", args.memory),
+    ];
     for (name, value) in numbers {
         if !(value.is_finite() && value >= 0.0) {
             let message = format!("{name} {value}: allowed is a number from 0");

@@ -1,0 +1,155 @@
+//! `vigil pomdp value`: what a policy earns.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+use vigil_cycle::signal;
+use vigil_missions::simulation::{Episode, PolicyAgent, Rules, Summary, horizon, run as drive};
+use vigil_pomdp::policy::{Dual, PolicyKind};
+use vigil_pomdp::solver::{PolicyValue, policy_value};
+use vigil_pomdp::{Budget, PointBased, Pomdp, mdp};
+use vigil_terminal::output::Progress;
+use vigil_terminal::{CommandError, Outcome};
+
+use super::compare::count;
+use super::{load, print, seed, solved};
+
+/// Steps of a sampled mission, at most.
+const STEPS_MAX: usize = 1_000_000;
+
+/// Says what a policy of `vigil pomdp solve` earns from the start belief.
+///
+/// For certain: between two bounds, by going through the beliefs that it reaches, the most probable
+/// first. Sampled: the mean over simulated missions, with its 95 % interval.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The model (.pomdp or .pomdpx).
+    file: PathBuf,
+    /// The policy.
+    #[arg(value_name = "POLICY")]
+    policy: PathBuf,
+    /// Beliefs to go through, at most.
+    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = count(1))]
+    beliefs_max: u64,
+    /// Missions to sample.
+    #[arg(long, default_value_t = 1000, value_parser = count(2))]
+    episodes: u64,
+    /// Seed of the missions. Each command draws its own numbers from a seed.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print one JSON document.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Document {
+    schema_version: u32,
+    file: String,
+    model_hash: String,
+    policy: String,
+    /// Bounds that hold for certain.
+    lower: f64,
+    upper: f64,
+    /// Beliefs that were gone through.
+    beliefs: usize,
+    /// Discounted share of the time that is spent beyond them.
+    beyond_share: f64,
+    episodes: u64,
+    seed: u64,
+    /// Steps after which a sampled mission is cut off, and what then is left of the discount.
+    steps_max: usize,
+    weight_beyond_horizon: f64,
+    mean: f64,
+    half_width_95: f64,
+}
+
+/// Values the policy, and prints the result.
+///
+/// # Errors
+/// A model or a policy that is refused; a discount of 1.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let model = load(&args.file)?;
+    let mut policy = solved::load(&model, "POLICY", &args.policy)?;
+    signal::install();
+    let mut stop = signal::stop_requested;
+    let mut budget = Budget::new(&mut stop);
+    let certain = policy_value(&model, &mut policy, args.beliefs_max as usize, &mut budget)
+        .map_err(|error| CommandError::failure(format!("{}: {error}", args.file.display())))?;
+    let steps_max = horizon(model.discount(), STEPS_MAX);
+    let sampled = sample(args, &model, &policy, steps_max)?;
+    let document = document(args, &model, &certain, sampled, steps_max);
+    print(args.json, &document, || summary(&document))?;
+    Ok(Outcome::Done)
+}
+
+fn sample(
+    args: &Args,
+    model: &Pomdp,
+    policy: &PointBased,
+    steps_max: usize,
+) -> Result<Summary, CommandError> {
+    let solution = mdp::solve(model).map_err(CommandError::usage)?;
+    let no_dual = |information| Dual::new(information, 1.0);
+    let decider = PolicyKind::PointBased
+        .build(model, &solution, no_dual, Some(policy))
+        .map_err(CommandError::usage)?;
+    let mut agent = PolicyAgent::new(model, decider);
+    let rules = Rules {
+        steps_max,
+        is_end: vec![false; model.actions().len()],
+    };
+    let seed = seed::for_command("value", args.seed);
+    let progress = Progress::new("missions", args.episodes as usize);
+    let earned = |number: u64| {
+        progress.show(number as usize);
+        drive(model, &mut agent, &rules, Episode { seed, number }).discounted
+    };
+    let mut earned: Vec<f64> = (0..args.episodes).map(earned).collect();
+    Ok(Summary::new(&mut earned))
+}
+
+fn document(
+    args: &Args,
+    model: &Pomdp,
+    certain: &PolicyValue,
+    sampled: Summary,
+    steps_max: usize,
+) -> Document {
+    Document {
+        schema_version: 1,
+        file: args.file.display().to_string(),
+        model_hash: format!("{:016x}", model.hash()),
+        policy: args.policy.display().to_string(),
+        lower: certain.lower,
+        upper: certain.upper,
+        beliefs: certain.beliefs,
+        beyond_share: certain.beyond,
+        episodes: args.episodes,
+        seed: args.seed,
+        steps_max,
+        weight_beyond_horizon: model.discount().powf(steps_max as f64),
+        mean: sampled.mean,
+        half_width_95: sampled.half_width,
+    }
+}
+
+fn summary(document: &Document) -> String {
+    let Document {
+        lower,
+        upper,
+        beliefs,
+        ..
+    } = document;
+    format!(
+        "{}: earns {lower:.10} to {upper:.10} for certain: {beliefs} beliefs, {:.3e} of the time \
+         beyond them\nsampled: {:.6} +- {:.6} (95 %), {} missions of {} steps, discount {:.1e} then",
+        document.policy,
+        document.beyond_share,
+        document.mean,
+        document.half_width_95,
+        document.episodes,
+        document.steps_max,
+        document.weight_beyond_horizon
+    )
+}
