@@ -53,6 +53,8 @@ pub const HELP_S: f64 = 30.0;
 pub struct ShippedGraph {
     /// The configuration.
     pub setup: Setup,
+    /// The same, with decisions by Q-MDP instead of a policy that was solved.
+    pub heuristic: Setup,
     /// Prices, shares and rules.
     pub missions: MissionFile,
 }
@@ -66,13 +68,21 @@ impl ShippedGraph {
     pub fn read(graph: &Path, rate_hz: f64) -> Result<Self, Box<dyn Error>> {
         let path = crate::root().join("config").join(graph);
         let setup = load_graph(&path, |file| file.graph.rate_hz = rate_hz)?;
-        let missions = MissionFile::read()?;
-        Ok(Self { setup, missions })
+        let heuristic = load_graph(&path, |file| {
+            file.graph.rate_hz = rate_hz;
+            file.supervisor.policy = "qmdp".to_owned();
+            file.supervisor.policy_file = None;
+        })?;
+        Ok(Self {
+            setup,
+            heuristic,
+            missions: MissionFile::read()?,
+        })
     }
 
     /// The commanders, Vigil first.
     #[must_use]
-    pub const fn arms(&self) -> [Arm; 6] {
+    pub const fn arms(&self) -> [Arm; 7] {
         let Rules {
             careful,
             stop_and_call,
@@ -83,6 +93,7 @@ impl ShippedGraph {
             Arm::Rule(Rule::Careful(careful)),
             Arm::Rule(Rule::StopAndCall(stop_and_call)),
             Arm::Rule(Rule::Ladder(ladder)),
+            Arm::Heuristic,
             Arm::Without,
             Arm::Told,
         ]

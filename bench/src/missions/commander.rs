@@ -18,6 +18,8 @@ pub enum Arm {
     Vigil,
     /// Rules over detector and identifier.
     Rule(Rule),
+    /// As Vigil, with decisions by Q-MDP: of the same model, without what information is worth.
+    Heuristic,
     /// Nobody watches: as planned, whatever happens.
     Without,
     /// Told what breaks when it begins, and how it will go on.
@@ -31,6 +33,7 @@ impl Arm {
         match self {
             Self::Vigil => "Vigil",
             Self::Rule(rule) => rule.name(),
+            Self::Heuristic => "Q-MDP",
             Self::Without => "without",
             Self::Told => "told the fault",
         }
@@ -61,9 +64,11 @@ impl<'a> Commander<'a> {
     ) -> Result<Self, Box<dyn Error>> {
         let file = &shipped.setup.file;
         let (sensors, rate_hz) = (file.detector.sensors, file.graph.rate_hz);
-        let stages = || simulated::stages(&shipped.setup, sensors, rate_hz, seed).map(Box::new);
+        let of = |setup| simulated::stages(setup, sensors, rate_hz, seed).map(Box::new);
+        let stages = || of(&shipped.setup);
         let mind = match arm {
             Arm::Vigil => Mind::Vigil(stages()?),
+            Arm::Heuristic => Mind::Vigil(of(&shipped.heuristic)?),
             Arm::Rule(rule) => Mind::Rule(stages()?, rule, Follower::new(rule)),
             Arm::Without => Mind::Without,
             Arm::Told => Mind::Told,

@@ -78,7 +78,8 @@ pub fn say(
     ));
     archive.say(
         "*careful*, *stop and call*, *ladder*: rules, each tuned on other missions (`--sweep`). \
-         *told the fault*: knows what breaks, when, and how it goes on.\n",
+         *Q-MDP*: Vigil with this policy of the same model. *told the fault*: knows what breaks, \
+         when, and how it goes on.\n",
     );
     archive.say("## Points\n");
     let names: Vec<&str> = arms.iter().map(Arm::name).collect();
@@ -157,6 +158,7 @@ pub fn shortfalls(file: &MissionFile, arms: &[Arm], missions: &[Mission]) -> Vec
     let mut short = Vec::new();
     short.extend(overall(&table));
     short.extend(by_kind(&table));
+    short.extend(against_heuristic(&table));
     let unsafe_ends = missions.iter().filter_map(|mission| mission.scores.first());
     let unsafe_ends = unsafe_ends.filter(|score| score.is_unsafe()).count();
     if unsafe_ends > 0 {
@@ -209,6 +211,15 @@ fn overall(table: &Table<'_>) -> Vec<String> {
     short
 }
 
+/// Over all kinds, against the heuristic policy of the same model.
+fn against_heuristic(table: &Table<'_>) -> Option<String> {
+    let heuristic = table.arms.iter().position(|arm| *arm == Arm::Heuristic)?;
+    let found = table.over_kinds(1.0, |kind| table.against(kind, heuristic, POINTS));
+    let name = table.arms[heuristic].name();
+    let text = || format!("{} against {name}, bar above 0", found.text(1, true));
+    (found.lower() <= 0.0).then(text)
+}
+
 /// By kind, against every rule.
 fn by_kind(table: &Table<'_>) -> Vec<String> {
     let mut short = Vec::new();
@@ -240,8 +251,8 @@ mod tests {
     fn bars_are_judged_by_the_paired_difference() {
         let shipped = ShippedGraph::read("rover.toml".as_ref(), 100.0).unwrap();
         let arms = shipped.arms();
-        // Points of Vigil, the three rules, without, told.
-        let driven = |points: [f64; 6], unanswered_m: f64| -> Vec<Mission> {
+        // Points of Vigil, the three rules, Q-MDP, without, told.
+        let driven = |points: [f64; 7], unanswered_m: f64| -> Vec<Mission> {
             let plans = Plan::of_all_kinds(3, 1).into_iter();
             let mission = |plan: Plan| {
                 let noise = (plan.seed % 3) as f64;
@@ -261,15 +272,16 @@ mod tests {
         let short = |points, unanswered_m| {
             shortfalls(&shipped.missions, &arms, &driven(points, unanswered_m))
         };
-        assert!(short([8.0, 0.0, -5.0, -9.0, -9.0, 10.0], 0.5).is_empty());
+        assert!(short([8.0, 0.0, -5.0, -9.0, 7.0, -9.0, 10.0], 0.5).is_empty());
         // 4 of a gap of 10, at three odds; and every mission ended unsafely.
-        let found = short([4.0, 0.0, -5.0, -9.0, -9.0, 10.0], 1.5);
+        let found = short([4.0, 0.0, -5.0, -9.0, 3.0, -9.0, 10.0], 1.5);
         assert_eq!(found.len(), 4, "{found:?}");
         assert_eq!(found[3], "21 of 21 missions ended unsafely, bar 0");
         // Behind the ladder: overall twice at each of the odds, and in every kind but the two with
         // a wider bar.
-        let found = short([0.0, -9.0, -9.0, 5.0, -9.0, 10.0], 0.0);
-        assert_eq!(found.len(), 6 + 5, "{found:?}");
+        let found = short([0.0, -9.0, -9.0, 5.0, 1.0, -9.0, 10.0], 0.0);
+        assert_eq!(found.len(), 6 + 5 + 1, "{found:?}");
+        assert_eq!(found[11], "-1.0 ± 0.0 against Q-MDP, bar above 0");
         assert_eq!(
             found[0],
             "-5.0 ± 0.0 against ladder (as stated), bar above 0"

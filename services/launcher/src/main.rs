@@ -20,6 +20,7 @@ mod restarts;
 mod summary;
 mod timeline;
 mod watchdog;
+mod weighing;
 mod words;
 
 use std::io::Write;

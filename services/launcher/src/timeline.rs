@@ -6,7 +6,7 @@ use std::fmt;
 use serde::Serialize;
 use vigil_blocks::{
     ActionRejection, Blindness, Event, EventKind, Evidence, MODE_MULTIPLE, Rejection, SizeKind,
-    mode_word,
+    Weighing, mode_word,
 };
 use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
@@ -16,6 +16,7 @@ use vigil_robot::injection::{Change, WireChange};
 use vigil_robot::publisher_check::Finding;
 use vigil_setup::Setup;
 
+use crate::weighing::NamedWeighing;
 use crate::words;
 
 /// An event in words.
@@ -35,6 +36,9 @@ pub struct TimelineEntry {
     /// Of a diagnosis of several faults: the most probable set, joined by `+`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fault_set: Option<String>,
+    /// Of what a decision was weighed from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weighing: Option<NamedWeighing>,
 }
 
 impl fmt::Display for TimelineEntry {
@@ -246,6 +250,7 @@ fn blind_s<'a>(
 /// Gives names to what events are about.
 struct Namer {
     nodes: Vec<String>,
+    states: Vec<String>,
     actions: Vec<String>,
     robot: vigil_robot::Description,
 }
@@ -256,6 +261,7 @@ impl Namer {
         let nodes = setup.tree.nodes().iter();
         Self {
             nodes: nodes.map(|node| node.name.clone()).collect(),
+            states: setup.decision.states().to_vec(),
             actions: setup.decision.actions().to_vec(),
             robot: setup.robot.clone(),
         }
@@ -280,7 +286,13 @@ impl Namer {
             p: has_p.then_some(event.p),
             fault_set: (kind == Some(EventKind::Diagnosis) && event.what == MODE_MULTIPLE)
                 .then(|| self.set(event.value)),
+            weighing: self.weighing(event),
         }
+    }
+
+    fn weighing(&self, event: &Event) -> Option<NamedWeighing> {
+        let weighing = Weighing::from_event(event)?;
+        Some(NamedWeighing::new(&weighing, &self.states, &self.actions))
     }
 
     /// Leaves, given as bits, joined by `+`.
@@ -368,6 +380,9 @@ impl Namer {
                     _ => action.to_owned(),
                 }
             }
+            EventKind::Weighed => self
+                .weighing(event)
+                .map_or_else(|| "?".into(), |weighing| weighing.to_string()),
             EventKind::Particles => format!("{} of {}", event.what, event.value),
             EventKind::Watchdog => {
                 let found = WatchdogFinding::from_repr(event.what);

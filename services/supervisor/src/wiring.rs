@@ -1,6 +1,8 @@
 //! The supervisor at its ports.
 
-use vigil_blocks::{Action, Cause, CauseKind, DetectionBelief, Entry, EventKind, FaultBelief};
+use vigil_blocks::{
+    Action, Cause, CauseKind, DetectionBelief, Entry, EventKind, FaultBelief, Weighing,
+};
 use vigil_cycle::{
     Clock, Graph, HealthBoard, InputAccount, Intake, PortError, Receiver, Sender, Stage, Stamp,
     Topic,
@@ -41,6 +43,7 @@ struct LastDecision {
     action: u32,
     wheel: u32,
     p: f64,
+    weighing: Option<Weighing>,
 }
 
 impl SupervisorStage {
@@ -165,6 +168,7 @@ impl Stage for SupervisorStage {
             action: action.action,
             wheel: action.wheel,
             p: action.belief[..states].iter().copied().fold(0.0, f64::max),
+            weighing: Weighing::new(action),
         };
         self.action.send(stamp, clock)
     }
@@ -185,9 +189,13 @@ impl Stage for SupervisorStage {
             action,
             wheel,
             p,
+            weighing,
         } = self.decided;
         if seq != self.decision_reported {
             health.event(now_ns, EventKind::Action, action, p, u64::from(wheel));
+            if let Some((what, p, value)) = weighing.as_ref().map(Weighing::to_event) {
+                health.event(now_ns, EventKind::Weighed, what, p, value);
+            }
             self.decision_reported = seq;
         }
     }

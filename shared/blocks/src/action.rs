@@ -122,7 +122,7 @@ pub enum ActionRejection {
 }
 
 /// What the values of actions are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr)]
 #[repr(u32)]
 pub enum ValueKind {
     /// Discounted reward to come under the policy.

@@ -115,6 +115,8 @@ pub enum EventKind {
     /// What is no fault has changed, as the ground does. `what`: the description's context, from 0;
     /// `value`: capture time of the change, ns.
     ContextChanged = 35,
+    /// What the last decision was weighed from: see [`crate::Weighing`].
+    Weighed = 36,
 }
 
 impl EventKind {

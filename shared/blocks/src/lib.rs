@@ -15,6 +15,7 @@ mod rejection;
 mod sensor;
 mod size_kind;
 mod verdict;
+mod weighing;
 
 pub use action::{
     Action, ActionRejection, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind,
@@ -37,3 +38,4 @@ pub use rejection::{REJECTIONS, Rejection};
 pub use sensor::{ActionOutcome, CHANNELS, COMMANDS, SensorFrame, Symptoms, WHEELS};
 pub use size_kind::SizeKind;
 pub use verdict::{NAME_SIZE, Verdict, fixed_name};
+pub use weighing::Weighing;

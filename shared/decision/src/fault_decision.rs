@@ -15,14 +15,10 @@ use crate::state_belief::{self, write_weights};
 use crate::states::{self, Leaf, LeafKind, StateMeaning, Subject};
 use crate::switching_cost::SwitchingCost;
 
-/// What the identifier reports about. A change of it opens a decision at once.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Report {
-    identifying: u32,
-    alarm: bool,
-    mode_change_count: u32,
-    writer_epoch: u64,
-}
+/// A belief that has moved by more than this since the last decision (half the sum of absolute
+/// differences) opens another at once. Chosen by hand: it changes no value by more than a twentieth
+/// of its range. Smaller decides in almost every cycle; larger lets a decision wait for its epoch.
+const MOVED: f64 = 0.05;
 
 /// Takes over the identifier's belief, tracks how old the unknown is, and chooses actions.
 pub(crate) struct FaultDecision {
@@ -35,7 +31,7 @@ pub(crate) struct FaultDecision {
     compensation: Vec<Compensation>,
     epoch_ns: u64,
     epoch_t_capture_ns: Option<u64>,
-    report: Option<Report>,
+    decision_t_capture_ns: u64,
     latch: Latch,
     switching: SwitchingCost,
     instruction: Option<Instruction>,
@@ -64,7 +60,7 @@ impl FaultDecision {
             compensation,
             epoch_ns: (settings.epoch_ms * 1e6) as u64,
             epoch_t_capture_ns: None,
-            report: None,
+            decision_t_capture_ns: 0,
             latch: Latch::default(),
             switching: SwitchingCost::new(settings.switching_cost),
             instruction: None,
@@ -94,31 +90,28 @@ impl FaultDecision {
             self.reset();
             self.process.run_id = diagnosis.run_id;
         }
-        let report = Report {
-            identifying: diagnosis.identifying,
-            alarm,
-            mode_change_count: diagnosis.mode_change_count,
-            writer_epoch: diagnosis.header.epoch,
-        };
-        let is_new = self.report.replace(report) != Some(report);
-        let timed = self.epoch_is_over(diagnosis.header.t_capture_ns);
-        if !(is_new || timed) {
-            return;
-        }
+        let t_capture_ns = diagnosis.header.t_capture_ns;
+        let timed = self.epoch_is_over(t_capture_ns);
         let process = &mut self.process;
-        process.control_mode = ControlMode::Policy;
         // A call is one step of the model, however long it takes: it ends with a reset.
         if timed && self.latch.action().is_none() {
             let action = process.choice.action;
             process.tracker.predict(&process.model, action);
         }
-        let predicted = process.tracker.belief();
+        let before = process.tracker.belief();
         let weights = &mut process.scratch;
-        write_weights(diagnosis, &self.states, alarm, predicted, weights);
-        process.log_evidence = log_score(predicted, weights);
+        write_weights(diagnosis, &self.states, alarm, before, weights);
+        normalise(weights);
+        if timed {
+            process.log_evidence = log_score(before, weights);
+        } else if distance(before, weights) <= MOVED && process.control_mode == ControlMode::Policy
+        {
+            return;
+        }
+        process.control_mode = ControlMode::Policy;
         process.tracker.anchor(weights);
         self.p = diagnosis.p;
-        self.decide();
+        self.decide(t_capture_ns);
     }
 
     /// True once per epoch, by differences of the capture time; a jump back begins a new epoch.
@@ -162,16 +155,18 @@ impl FaultDecision {
         }
         self.process.tracker.anchor(&self.process.scratch);
         self.process.control_mode = ControlMode::Fallback;
-        self.report = None;
-        self.decide();
+        self.decide(detection.header.t_capture_ns);
     }
 
-    fn decide(&mut self) {
+    fn decide(&mut self, t_capture_ns: u64) {
+        let passed_ns = t_capture_ns.saturating_sub(self.decision_t_capture_ns);
+        self.decision_t_capture_ns = t_capture_ns;
+        let share = (passed_ns as f64 / self.epoch_ns as f64).min(1.0);
         let process = &mut self.process;
         let mut best = process.decider.decide(process.tracker.belief()).choice();
         if process.decider.measure() == Measure::Value {
             let (held, values) = (process.choice.action, process.decider.values());
-            if !self.switching.is_due(held, best.action, values) && best.action != held {
+            if !self.switching.is_due(held, best.action, values, share) && best.action != held {
                 best = stands(held);
             }
         }
@@ -210,13 +205,23 @@ impl FaultDecision {
     }
 }
 
-/// How well a belief was predicted: the mean of the logarithm of the predicted probability, over
-/// the belief that `weights` are. No more than 0; what was held impossible counts as 1e-12.
-fn log_score(predicted: &[f64], weights: &[f64]) -> f64 {
+/// Some weight is more than 0: a diagnosis that has none is not sound.
+fn normalise(weights: &mut [f64]) {
     let sum: f64 = weights.iter().sum();
-    let score = |(predicted, weight): (&f64, &f64)| weight * predicted.clamp(1e-12, 1.0).ln();
-    let scores: f64 = predicted.iter().zip(weights).map(score).sum();
-    if sum > 0.0 { scores / sum } else { 0.0 }
+    weights.iter_mut().for_each(|weight| *weight /= sum);
+}
+
+/// Half the sum of absolute differences.
+fn distance(one: &[f64], other: &[f64]) -> f64 {
+    let differences = one.iter().zip(other).map(|(a, b)| (a - b).abs());
+    0.5 * differences.sum::<f64>()
+}
+
+/// How well a belief was predicted: the mean of the logarithm of the predicted probability, over
+/// the belief. No more than 0; what was held impossible counts as 1e-12.
+fn log_score(predicted: &[f64], belief: &[f64]) -> f64 {
+    let score = |(predicted, b): (&f64, &f64)| b * predicted.clamp(1e-12, 1.0).ln();
+    predicted.iter().zip(belief).map(score).sum()
 }
 
 impl DecisionRule for FaultDecision {
@@ -237,9 +242,7 @@ impl DecisionRule for FaultDecision {
         }
         match (diagnosis, detection) {
             (Some(diagnosis), _) => {
-                if self.process.losses.diagnosis() {
-                    self.report = None;
-                }
+                self.process.losses.diagnosis();
                 self.take_diagnosis(diagnosis, situation.alarm);
             }
             (None, Some(detection)) if self.process.losses.identifier_is_lost() => {
@@ -257,19 +260,16 @@ impl DecisionRule for FaultDecision {
             self.process.losses.detection();
         }
         self.process.control_mode = ControlMode::Safe;
-        self.report = None;
     }
 
     fn miss(&mut self, count: u32) {
         if self.process.losses.miss(count) {
             self.process.control_mode = ControlMode::Safe;
-            self.report = None;
         }
     }
 
     fn reset(&mut self) {
         self.process.reset();
-        self.report = None;
         self.latch.release();
         self.epoch_t_capture_ns = None;
         self.begin();

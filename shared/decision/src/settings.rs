@@ -51,11 +51,11 @@ pub struct Settings {
     pub as_published: bool,
     /// With `faults`, and a policy that compares values: what a change of action costs, in the
     /// decision model's rewards. An action is left for another once that would have earned this
-    /// much more, summed over decisions: what is much better is taken at once, and two actions that
+    /// much more, summed over time: what is much better is taken at once, and two actions that
     /// take turns in being better do not alternate. 0: always the best.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub switching_cost: f64,
-    /// Interval between decision epochs. A change of the diagnosed mode opens an epoch at once.
+    /// Interval between decision epochs. A belief that moves opens a decision at once.
     /// With `symptoms` this is the longest epoch, at least 1000: an outcome or a new symptom ends
     /// it too; an action that the robot says is running has until `action_max_s`.
     #[default(100.0)]

@@ -2,8 +2,8 @@
 //!
 //! States exclude each other, faults do not: a set of several faults counts once. It belongs to
 //! SEVERAL: an action compensates one wheel, and ignores one encoder. In a model without that state
-//! it belongs to the one that holds all of its leaves; else to UNKNOWN. What the sets that are reported leave of a leaf's
-//! probability counts for the leaf.
+//! it belongs to the one that holds all of its leaves; else to UNKNOWN. What the sets that are
+//! reported leave of a leaf's probability counts for the leaf.
 //!
 //! States that stand for the same (UNKNOWN and UNKNOWN_OLD) share its probability as the predicted
 //! belief does: the identifier says nothing of a fault's age, the decision model's transitions do.

@@ -7,7 +7,6 @@ use vigil_pomdp::Pomdp;
 use vigil_robot::{Description, FaultTree};
 
 use crate::error::SupervisorError;
-use crate::mapping::check_size;
 
 /// Name of the decision model's state for deviations that no fault model explains.
 const UNKNOWN: &str = "UNKNOWN";
@@ -92,7 +91,6 @@ pub(crate) fn states(
     model: &Pomdp,
     tree: &FaultTree,
 ) -> Result<Vec<StateMeaning>, SupervisorError> {
-    check_size(model)?;
     let names = model.states();
     let nominal = tree.nodes()[0].name.as_str();
     let meaning = |name: &String| StateMeaning {

@@ -1,7 +1,7 @@
-//! A change of action has its price: a robot that brakes and speeds up twice a second wears out, and
-//! nobody can read what it is about.
+//! A change of action has its price: a robot that brakes and speeds up twice a second wears out,
+//! and nobody can read what it is about.
 //!
-//! An action is left for another once what the other would have earned more, summed over decisions,
+//! An action is left for another once what the other would have earned more, summed over time,
 //! is the price: the rule of the ski rental (Karlin, Manasse, Rudolph and Sleator, Algorithmica
 //! 1988), which pays at most twice what the best moment to change would have cost. What is much
 //! better is so taken at once, what is a little better after a while, and two actions that take
@@ -26,11 +26,12 @@ impl SwitchingCost {
         }
     }
 
-    /// True if `held` is to be left for `best`; `values` are those of all actions.
-    pub(crate) fn is_due(&mut self, held: usize, best: usize, values: &[f64]) -> bool {
+    /// True if `held` is to be left for `best`. `values` are those of all actions, taken for one
+    /// epoch; `share` of an epoch has passed since the last decision.
+    pub(crate) fn is_due(&mut self, held: usize, best: usize, values: &[f64], share: f64) -> bool {
         let own = values.get(held).copied().unwrap_or(f64::NEG_INFINITY);
         for (regret, value) in self.regret.iter_mut().zip(values) {
-            *regret = (*regret + value - own).max(0.0);
+            *regret = (*regret + share * (value - own)).max(0.0);
         }
         let lost = self.regret.get(best).copied().unwrap_or(f64::INFINITY);
         let is_due = held != best && lost >= self.cost;
@@ -55,7 +56,7 @@ mod tests {
         let (mut switching, mut held) = (SwitchingCost::new(cost), 0);
         let hold = |values: &[f64; 2]| {
             let best = usize::from(values[1] > values[0]);
-            if switching.is_due(held, best, values) {
+            if switching.is_due(held, best, values, 1.0) {
                 held = best;
             }
             held
@@ -70,6 +71,10 @@ mod tests {
         assert_eq!(held(1.0, &[little, little, little]), [0, 1, 1]);
         assert_eq!(held(1.0, &[little, less, little, little]), [0, 0, 0, 1]);
         assert_eq!(held(0.0, &[little, less, little]), [1, 0, 1]);
+        // Half an epoch counts half.
+        let mut switching = SwitchingCost::new(1.0);
+        assert!(!switching.is_due(0, 1, &much, 0.25));
+        assert!(switching.is_due(0, 1, &much, 0.25));
         // Equal ones are not worth a change, whatever it costs.
         assert_eq!(held(0.0, &[[1.0, 1.0]]), [0]);
     }

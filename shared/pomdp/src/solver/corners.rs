@@ -13,7 +13,8 @@ use crate::sparse_beliefs::BeliefId;
 const STATES_MAX: usize = 128;
 /// A walk from a corner aims at this share of its gap.
 const TARGET_SHARE: f64 = 0.5;
-/// A corner is lowered where that takes this share of its gap: all points have to be looked at anew.
+/// A corner is lowered where that takes this share of its gap: all points have to be looked at
+/// anew.
 const LOWERED_SHARE: f64 = 0.05;
 
 impl Tree<'_> {

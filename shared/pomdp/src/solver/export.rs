@@ -12,9 +12,10 @@ const COMPARISONS_MAX: usize = 5_000_000;
 const UNBEATEN_MAX: usize = 2_000_000;
 
 impl Tree<'_> {
-    /// The vectors that a policy needs: those that are looked at, the plan from `root`, and all that
-    /// these go on to, so that a policy earns at least what its vectors say. Where a plan goes on to a vector that another one beats in every state, that one does instead; what
-    /// is beaten so is left out. An action that is never the best may be without a vector.
+    /// The vectors that a policy needs: those that are looked at, the plan from `root`, and all
+    /// that these go on to, so that a policy earns at least what its vectors say. Where a plan goes
+    /// on to a vector that another one beats in every state, that one does instead; what is beaten
+    /// so is left out. An action that is never the best may be without a vector.
     pub(super) fn vectors(&self, root: BeliefId) -> Result<AlphaVectors, VectorError> {
         let actions = self.model.actions().len();
         let mut needed: Vec<AlphaId> = self.alphas.active().collect();

@@ -2,8 +2,8 @@
 //!
 //! Near a discount of 1, or where something rare disturbs a state of rest, a walk follows the most
 //! probable observation round and round. Here the beliefs at the edge of the most promising plan
-//! with the largest share in the gap are expanded: the gap at the root is the sum of theirs, each as
-//! often as it is visited.
+//! with the largest share in the gap are expanded: the gap at the root is the sum of theirs, each
+//! as often as it is visited.
 
 use super::occupancy::{Plan, Visited};
 use super::tree::Tree;

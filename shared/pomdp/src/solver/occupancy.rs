@@ -1,8 +1,8 @@
 //! How often the beliefs of the graph are visited under a plan.
 //!
 //! Where a plan goes round in circles, or rests, most of its visits come from beliefs that follow
-//! upon each other again and again: near a discount of 1 the sum over all visits is a linear system,
-//! not a walk.
+//! upon each other again and again: near a discount of 1 the sum over all visits is a linear
+//! system, not a walk.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -1,8 +1,9 @@
 //! What a given policy earns.
 //!
-//! A policy that remembers nothing but the belief is a Markov chain over the beliefs that it reaches.
-//! The most probable of them are gone through; the value at the start is a linear system, in which
-//! the others are worth the smallest reward for ever, or what is earned by whoever knows the state.
+//! A policy that remembers nothing but the belief is a Markov chain over the beliefs that it
+//! reaches. The most probable of them are gone through; the value at the start is a linear system,
+//! in which the others are worth the smallest reward for ever, or what is earned by whoever knows
+//! the state.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -28,8 +29,8 @@ pub struct PolicyValue {
     pub beyond: f64,
 }
 
-/// Goes through `beliefs_max` beliefs at most, of the chain that `policy` makes of `model`. The policy
-/// must remember nothing: dual control does.
+/// Goes through `beliefs_max` beliefs at most, of the chain that `policy` makes of `model`. The
+/// policy must remember nothing: dual control does.
 ///
 /// # Errors
 /// [`SolveError::Unbounded`] for a discount of 1; [`SolveError::Stopped`] if the budget ends.
@@ -52,7 +53,8 @@ pub fn policy_value(
     });
     let least = rewards.fold(f64::INFINITY, f64::min) / (1.0 - discount);
     let bounds = [vec![least; states.len()], most.collect()];
-    let chain = Chain::new(model, policy, beliefs_max, bounds, budget)?;
+    let walk = Walk::new(model, policy, beliefs_max, budget)?;
+    let chain = Chain::new(discount, walk, &bounds);
     let [lower, upper] = chain.beyond_worth.each_ref().map(|worth| {
         let right = chain.rewards.iter().zip(worth);
         let right: Vec<f64> = right.map(|(reward, beyond)| reward + beyond).collect();
@@ -86,80 +88,94 @@ struct Chain {
     mass_max: f64,
 }
 
-impl Chain {
+/// One step of the chain: its reward, and the beliefs that follow with their probabilities.
+type Step = (f64, Vec<(BeliefId, f64)>);
+
+/// The beliefs that were met, and the steps from those that were gone through.
+#[derive(Default)]
+struct Walk {
+    store: SparseBeliefs,
+    /// For each belief its step, where it was gone through.
+    place: Vec<Option<usize>>,
+    steps: Vec<Step>,
+}
+
+impl Walk {
     fn new(
         model: &Pomdp,
         policy: &mut dyn Policy,
         beliefs_max: usize,
-        bounds: [Vec<f64>; 2],
         budget: &mut Budget<'_>,
     ) -> Result<Self, SolveError> {
-        let mut store = SparseBeliefs::default();
-        let (mut followers, mut steps) = (Followers::default(), Vec::new());
+        let mut walk = Self::default();
+        let mut followers = Followers::default();
         let start = model.start().iter().enumerate().filter(|(_, b)| **b > 0.0);
         let start: Vec<(u32, f64)> = start.map(|(s, b)| (s as u32, *b)).collect();
-        let root = store.intern(&start);
-        let mut place: Vec<Option<usize>> = vec![None];
+        let root = walk.store.intern(&start);
+        walk.place.push(None);
         let mut values = vec![0.0; model.actions().len()];
         let mut dense = vec![0.0; model.states().len()];
         // By the probability of one way there; of equal ones the belief that was met first.
         let mut open = BinaryHeap::from([(1.0_f64.to_bits(), Reverse(root))]);
         while let Some((weight, Reverse(id))) = open.pop() {
-            if place[id as usize].is_some() {
+            if walk.place[id as usize].is_some() {
                 continue;
             }
-            if steps.len() == beliefs_max {
+            if walk.steps.len() == beliefs_max {
                 break;
             }
-            place[id as usize] = Some(steps.len());
-            let belief = store.entries(id).to_vec();
+            walk.place[id as usize] = Some(walk.steps.len());
+            let belief = walk.store.entries(id).to_vec();
             dense.fill(0.0);
             belief.iter().for_each(|(s, b)| dense[*s as usize] = *b);
             let action = policy.evaluate(&dense, &mut values).action;
-            let reward = belief
-                .iter()
-                .map(|(s, b)| b * model.reward(*s as usize, action));
+            let rewards = belief.iter();
+            let reward = rewards.map(|(s, b)| b * model.reward(*s as usize, action));
             let reward: f64 = reward.sum();
             let mut next: Vec<(BeliefId, f64)> = Vec::new();
             let work = followers.each(model, &belief, action, |follower| {
-                let id = store.intern(follower.belief);
+                let id = walk.store.intern(follower.belief);
                 next.push((id, follower.probability));
                 Ok::<(), SolveError>(())
             })?;
             budget.spend(work + 20 * next.len())?;
-            place.resize(store.len(), None);
+            walk.place.resize(walk.store.len(), None);
             let weight = f64::from_bits(weight) * model.discount();
             for (id, p) in &next {
-                if place[*id as usize].is_none() {
+                if walk.place[*id as usize].is_none() {
                     open.push(((weight * p).to_bits(), Reverse(*id)));
                 }
             }
-            steps.push((reward, next));
+            walk.steps.push((reward, next));
         }
+        Ok(walk)
+    }
+}
+
+impl Chain {
+    /// `bounds` of what is earned in each state beyond the walk.
+    fn new(discount: f64, walk: Walk, bounds: &[Vec<f64>; 2]) -> Self {
         let mut chain = Self {
-            discount: model.discount(),
+            discount,
             rewards: Vec::new(),
             links: Rows::default(),
             beyond: Vec::new(),
             beyond_worth: [Vec::new(), Vec::new()],
             mass_max: 0.0,
         };
-        for (reward, next) in steps {
+        for (reward, next) in walk.steps {
             let (mut beyond, mut worth, mut mass) = (0.0, [0.0; 2], 0.0);
             for (id, p) in next {
-                match place[id as usize] {
-                    Some(to) => {
-                        chain.links.push(to, p);
-                        mass += p;
-                    }
-                    None => {
-                        beyond += p;
-                        for (worth, bound) in worth.iter_mut().zip(&bounds) {
-                            let entries = store.entries(id).iter();
-                            let value: f64 = entries.map(|(s, b)| b * bound[*s as usize]).sum();
-                            *worth += model.discount() * p * value;
-                        }
-                    }
+                if let Some(to) = walk.place[id as usize] {
+                    chain.links.push(to, p);
+                    mass += p;
+                    continue;
+                }
+                beyond += p;
+                for (worth, bound) in worth.iter_mut().zip(bounds) {
+                    let entries = walk.store.entries(id).iter();
+                    let value: f64 = entries.map(|(s, b)| b * bound[*s as usize]).sum();
+                    *worth += discount * p * value;
                 }
             }
             chain.links.end_row();
@@ -170,11 +186,11 @@ impl Chain {
             }
             chain.mass_max = chain.mass_max.max(mass);
         }
-        Ok(chain)
+        chain
     }
 
-    /// The value at the start: no less than the first, no more than the second, which differ by what
-    /// is left of the system's error.
+    /// The value at the start: no less than the first, no more than the second, which differ by
+    /// what is left of the system's error.
     fn solve(&self, right: &[f64], budget: &mut Budget<'_>) -> Result<(f64, f64), SolveError> {
         let system = System {
             rows: &self.links,

@@ -9,7 +9,8 @@ use crate::public::{self, TIGER};
 use crate::simulation::earned;
 use crate::solver::solved;
 
-/// A part is good or bad; each look costs `LOOK` and is right with `RIGHT`; using a bad one is dear.
+/// A part is good or bad; each look costs `LOOK` and is right with `RIGHT`; using a bad one is
+/// dear.
 fn part(discount: f64) -> Pomdp {
     let text = format!(
         "discount: {discount:?}\nstates: good bad gone\nactions: look use leave\n\
@@ -49,8 +50,8 @@ fn value_of_part(discount: f64) -> f64 {
     values[MOST]
 }
 
-/// One of `n` parts is broken. A test of one is noisy and cheap; the wrong repair is dear; after any
-/// repair another part breaks.
+/// One of `n` parts is broken. A test of one is noisy and cheap; the wrong repair is dear; after
+/// any repair another part breaks.
 fn repairs(n: usize, discount: f64) -> Pomdp {
     let all = |name: &str| (0..n).map(|i| format!(" {name}{i}")).collect::<String>();
     let (states, tests, fixes) = (all("part"), all("test"), all("fix"));

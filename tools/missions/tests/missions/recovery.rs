@@ -38,7 +38,8 @@ fn belief(model: &Pomdp, parts: &[(&str, f64)]) -> Vec<f64> {
 fn the_file_is_what_its_parameters_generate() {
     assert!(
         generate(&parameters()).unwrap() == MODEL,
-        "run: vigil pomdp generate config/rover.recovery.toml --out config/rover.pomdp, and solve again"
+        "run: vigil pomdp generate config/rover.recovery.toml --out config/rover.pomdp, \
+         and solve again"
     );
     assert!(model().warnings().is_empty());
 }

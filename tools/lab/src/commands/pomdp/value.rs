@@ -143,7 +143,8 @@ fn summary(document: &Document) -> String {
     } = document;
     format!(
         "{}: earns {lower:.10} to {upper:.10} for certain: {beliefs} beliefs, {:.3e} of the time \
-         beyond them\nsampled: {:.6} +- {:.6} (95 %), {} missions of {} steps, discount {:.1e} then",
+         beyond them\nsampled: {:.6} +- {:.6} (95 %), {} missions of {} steps, discount {:.1e} \
+         then",
         document.policy,
         document.beyond_share,
         document.mean,
