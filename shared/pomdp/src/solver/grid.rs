@@ -26,7 +26,7 @@ const ROUNDS_MAX: usize = 20;
 
 /// What stands for the beliefs that are not part of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Outside {
+pub(super) enum Outside {
     /// The bounds that they have.
     Bounds,
     /// The nearest point and the corners, which are part of it: where a plan goes round and round
@@ -66,15 +66,6 @@ impl Choices {
 }
 
 impl Tree<'_> {
-    /// Lowers the upper bounds of all expanded beliefs to what they allow each other.
-    pub(super) fn lower_all(&mut self, budget: &mut Budget<'_>) -> Result<(), StopRequest> {
-        self.lower_with(Outside::Bounds, budget)?;
-        if self.model.states().len() <= CORNERS_MAX {
-            self.lower_with(Outside::Points, budget)?;
-        }
-        Ok(())
-    }
-
     /// The beliefs of the process: those that are expanded, or, where points stand for what is
     /// outside, the points and the corners alone, by every action that may be the best.
     fn process(
@@ -109,7 +100,15 @@ impl Tree<'_> {
         Ok(ids)
     }
 
-    fn lower_with(&mut self, outside: Outside, budget: &mut Budget<'_>) -> Result<(), StopRequest> {
+    /// Lowers the upper bounds of the process's beliefs to what they allow each other.
+    pub(super) fn lower_all(
+        &mut self,
+        outside: Outside,
+        budget: &mut Budget<'_>,
+    ) -> Result<(), StopRequest> {
+        if outside == Outside::Points && self.model.states().len() > CORNERS_MAX {
+            return Ok(());
+        }
         let ids = self.process(outside, budget)?;
         if ids.len() > BELIEFS_MAX {
             return Ok(());

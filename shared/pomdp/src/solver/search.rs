@@ -1,6 +1,7 @@
 //! What is done in which order: walks, and now and then what serves all beliefs at once.
 
 use super::controller::Edge;
+use super::grid::Outside;
 use super::occupancy::Plan;
 use super::report::{Bracket, EndReason, Options, Progress};
 use super::tree::Tree;
@@ -24,6 +25,8 @@ const WORTHWHILE_SHARE: f64 = 1e-3;
 const PAUSE_MIN: u64 = 4;
 const PAUSE_START: u64 = 8;
 const PAUSE_MAX: u64 = 1024;
+/// What is not due before something else has happened.
+const NEVER: u64 = u64::MAX;
 /// Times that a controller is tied anew while it pays: each costs a linear system.
 const CONTROLLERS_MAX: usize = 10;
 /// Vectors and points below which nothing is pruned. Chosen by hand: so few are cheap to keep.
@@ -90,7 +93,10 @@ impl<'m> Search<'m> {
             root,
             progress: Progress::default(),
             controller: Rhythm::new(),
-            improvement: Rhythm::new(),
+            improvement: Rhythm {
+                due: NEVER,
+                ..Rhythm::new()
+            },
             grid: Rhythm::new(),
             edge_work: 0,
             rounding,
@@ -171,10 +177,14 @@ impl<'m> Search<'m> {
         let mut value = tree.lower(root, budget)?;
         let share = WORTHWHILE_SHARE * pays;
         for _ in 0..CONTROLLERS_MAX {
-            tree.value_controller(root, Plan::Held, Edge::Best, share, budget)?;
-            tree.value_controller(root, Plan::Promising, Edge::Nearest, share, budget)?;
+            let before = value;
             tree.value_controller(root, Plan::Promising, Edge::Best, share, budget)?;
-            let before = std::mem::replace(&mut value, tree.lower(root, budget)?);
+            value = tree.lower(root, budget)?;
+            if value - before <= pays {
+                tree.value_controller(root, Plan::Held, Edge::Best, share, budget)?;
+                tree.value_controller(root, Plan::Promising, Edge::Nearest, share, budget)?;
+                value = tree.lower(root, budget)?;
+            }
             if value - before <= pays || budget.spent() - began > began / PAUSE_MIN {
                 break;
             }
@@ -191,6 +201,10 @@ impl<'m> Search<'m> {
             let value = self.tie_controllers(pays, budget)?;
             let is_better = value - lower > pays;
             self.controller.done(began, budget.spent(), is_better);
+            if !is_better && self.improvement.due == NEVER {
+                // Only then, and later: it costs more than all that came before.
+                self.improvement.due = PAUSE_START * budget.spent();
+            }
         }
         let began = budget.spent();
         if began >= self.improvement.due {
@@ -202,7 +216,10 @@ impl<'m> Search<'m> {
         let tree = &mut self.tree;
         let began = budget.spent();
         if began >= self.grid.due {
-            tree.lower_all(budget)?;
+            tree.lower_all(Outside::Bounds, budget)?;
+            if upper - tree.upper(root, budget)? <= pays {
+                tree.lower_all(Outside::Points, budget)?;
+            }
             let gain = upper - tree.upper(root, budget)?;
             self.grid.done(began, budget.spent(), gain > pays);
         }
