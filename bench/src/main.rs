@@ -57,6 +57,9 @@ enum Question {
     RealLogs(real_logs::Args),
     /// How many lines of code does each room have, and what do the services link?
     Size(size::Args),
+    /// How near are the solver's bounds after a fixed time, and does every policy earn what it
+    /// says?
+    Solver(solver::Args),
     /// Are taped wheels of a real robot found, and told apart?
     TapedWheels,
     /// Writes bench/README.md anew from the results
@@ -92,6 +95,7 @@ impl Question {
             Self::Promise(args) => promise::run(args),
             Self::RealLogs(args) => real_logs::run(args),
             Self::Size(args) => size::run(args),
+            Self::Solver(args) => solver::run(args),
             Self::TapedWheels => taped_wheels::run(),
             Self::Page => write_page(),
             Self::Role(role) => role.play(),

@@ -13,4 +13,5 @@ pub mod peers;
 pub mod promise;
 pub mod real_logs;
 pub mod size;
+pub mod solver;
 pub mod taped_wheels;

@@ -1,7 +1,6 @@
 //! From the fault tree's leaves to the decision model's states.
 //!
-//! A leaf belongs to the state of its own name; else to that of the nearest node above it; else to
-//! that of its kind in capitals, `STUCK` for `stuck:LF`; else to `FAULT`.
+//! Which state a leaf belongs to says [`FaultTree::state_names`].
 
 use vigil_pomdp::Pomdp;
 use vigil_robot::{Description, FaultTree};
@@ -115,7 +114,7 @@ pub(crate) fn states(
             };
             names.iter().zip(&meanings).position(same)
         };
-        let found = candidates(tree, leaf).find_map(|name| holds(&name));
+        let found = tree.state_names(leaf).find_map(|name| holds(&name));
         let state =
             found.ok_or_else(|| SupervisorError::NoState(tree.nodes()[leaf].name.clone()))?;
         meanings[state].leaves |= 1 << leaf;
@@ -127,18 +126,6 @@ pub(crate) fn states(
         Some((name, _)) => Err(SupervisorError::NoLeaf(name.clone())),
         None => Ok(meanings),
     }
-}
-
-/// Names of the states that a leaf may belong to, the first that exists counts.
-fn candidates(tree: &FaultTree, leaf: usize) -> impl Iterator<Item = String> {
-    let node = |at: usize| tree.nodes().get(at);
-    let above = std::iter::successors(node(leaf), move |child| child.parent.and_then(node));
-    let fault = node(leaf).and_then(|leaf| leaf.fault.as_deref());
-    let kind = fault.and_then(|fault| fault.split(':').next());
-    let kind = kind.unwrap_or_default().to_uppercase();
-    above
-        .map(|node| node.name.clone())
-        .chain([kind, FAULT.to_owned()])
 }
 
 #[cfg(test)]

@@ -104,6 +104,20 @@ impl FaultTree {
         self.nodes.iter().position(|node| node.name == name)
     }
 
+    /// Names of the states of a decision model that a leaf may belong to; the first that the model
+    /// has counts: the leaf's own, those of the nodes above it, its kind in capitals (`STUCK` for
+    /// `stuck:LF`), `FAULT`.
+    pub fn state_names(&self, leaf: usize) -> impl Iterator<Item = String> {
+        let node = |at: usize| self.nodes.get(at);
+        let above = std::iter::successors(node(leaf), move |child| child.parent.and_then(node));
+        let fault = node(leaf).and_then(|leaf| leaf.fault.as_deref());
+        let kind = fault.and_then(|fault| fault.split(':').next());
+        let kind = kind.unwrap_or_default().to_uppercase();
+        above
+            .map(|node| node.name.clone())
+            .chain([kind, "FAULT".to_owned()])
+    }
+
     /// Number of ancestors of node `i`.
     #[must_use]
     pub fn depth(&self, i: usize) -> usize {

@@ -380,13 +380,13 @@ fn risk_raised(
         .map_err(|error| IdentifierError::Build(error.to_string()))
 }
 
-/// Name of each mode among the states of a decision model, and its prior probability.
-fn names<'a>(tree: &'a FaultTree, nodes_of_modes: &[ModeNode], prior: f64) -> Vec<(&'a str, f64)> {
+/// Of each mode the names of the states that it may belong to, and its prior probability.
+fn names(tree: &FaultTree, nodes_of_modes: &[ModeNode], prior: f64) -> Vec<(Vec<String>, f64)> {
     let nominal = 1.0 - prior * nodes_of_modes.len().saturating_sub(1) as f64;
     let named = nodes_of_modes.iter().map(|meaning| match meaning {
-        ModeNode::Node(0) => (tree.nodes()[0].name.as_str(), nominal),
-        ModeNode::Node(node) => (tree.nodes()[*node].name.as_str(), prior),
-        ModeNode::Unknown => ("UNKNOWN", prior),
+        ModeNode::Node(0) => (vec![tree.nodes()[0].name.clone()], nominal),
+        ModeNode::Node(node) => (tree.state_names(*node).collect(), prior),
+        ModeNode::Unknown => (vec!["UNKNOWN".to_owned()], prior),
     });
     named.collect()
 }

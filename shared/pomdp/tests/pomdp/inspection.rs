@@ -1,7 +1,5 @@
 //! Deep inspection: cheap repeated tests before an act that is dear to get wrong.
 
-use std::fmt::Write as _;
-
 use vigil_pomdp::solver::{EndReason, compact, policy_value};
 use vigil_pomdp::{Budget, Choice, Control, PointBased, Policy, Pomdp, QMdp, mdp};
 
@@ -9,26 +7,22 @@ use crate::public::{self, TIGER};
 use crate::simulation::earned;
 use crate::solver::solved;
 
-/// A part is good or bad; each look costs `LOOK` and is right with `RIGHT`; using a bad one is
-/// dear.
-fn part(discount: f64) -> Pomdp {
-    let text = format!(
-        "discount: {discount:?}\nstates: good bad gone\nactions: look use leave\n\
-         observations: plus minus\nstart: 0.5 0.5 0\n\
-         T: look identity\nT: use : * : gone 1\nT: leave : * : gone 1\n\
-         O: * uniform\nO: look : good\n{RIGHT} {wrong}\nO: look : bad\n{wrong} {RIGHT}\n\
-         R: look : good : * : * {look}\nR: look : bad : * : * {look}\n\
-         R: use : good : * : * 10\nR: use : bad : * : * -100\n",
-        wrong = 1.0 - RIGHT,
-        look = -LOOK
-    );
-    Pomdp::parse(&text).unwrap()
+/// A model of `tests/models` at another discount.
+fn at(text: &str, discount: f64) -> Pomdp {
+    let line = format!("discount: {discount:?}");
+    Pomdp::parse(&text.replace("discount: 0.95", &line)).unwrap()
 }
 
+/// Looks at a part before it is used.
+const PART: &str = include_str!("../models/part.pomdp");
+/// Tests of four parts before one is repaired, again and again.
+const REPAIRS: &str = include_str!("../models/repairs.pomdp");
+
+/// How often a look of `PART` is right, and its price.
 const RIGHT: f64 = 0.75;
 const LOOK: f64 = 0.1;
 
-/// The value of `part`, by value iteration over what matters: how many more looks said good.
+/// The value of `PART`, by value iteration over what matters: how many more looks said good.
 fn value_of_part(discount: f64) -> f64 {
     const MOST: usize = 40;
     let p = |at: usize| {
@@ -50,32 +44,11 @@ fn value_of_part(discount: f64) -> f64 {
     values[MOST]
 }
 
-/// One of `n` parts is broken. A test of one is noisy and cheap; the wrong repair is dear; after
-/// any repair another part breaks.
-fn repairs(n: usize, discount: f64) -> Pomdp {
-    let all = |name: &str| (0..n).map(|i| format!(" {name}{i}")).collect::<String>();
-    let (states, tests, fixes) = (all("part"), all("test"), all("fix"));
-    let mut text = format!(
-        "discount: {discount:?}\nstates:{states}\nactions:{tests}{fixes}\n\
-         observations: yes no\nT: * uniform\nO: * uniform\nR: * : * : * : * -50\n"
-    );
-    for i in 0..n {
-        write!(
-            text,
-            "T: test{i} identity\nO: test{i} : * : yes 0.2\nO: test{i} : * : no 0.8\n\
-             O: test{i} : part{i} : yes 0.8\nO: test{i} : part{i} : no 0.2\n\
-             R: test{i} : * : * : * -1\nR: fix{i} : part{i} : * : * 20\n"
-        )
-        .unwrap();
-    }
-    Pomdp::parse(&text).unwrap()
-}
-
 #[test]
 fn looks_before_an_act_are_worth_what_counting_them_says() {
     for discount in [0.95, 0.99, 0.999, 0.9999] {
         let wanted = value_of_part(discount);
-        let (found, _) = solved(&part(discount), 1e-5, 40_000);
+        let (found, _) = solved(&at(PART, discount), 1e-5, 40_000);
         let bracket = found.bracket;
         assert_eq!(found.ended, EndReason::Precision, "{discount}: {bracket:?}");
         let (lower, upper) = (bracket.lower - 1e-9, bracket.upper + 1e-9);
@@ -86,12 +59,12 @@ fn looks_before_an_act_are_worth_what_counting_them_says() {
 #[test]
 fn acts_again_and_again_are_solved_at_every_discount() {
     for discount in [0.95, 0.99, 0.999, 0.9999] {
-        let (found, _) = solved(&repairs(3, discount), 1e-6 / (1.0 - discount), 100_000);
+        let (found, _) = solved(&at(REPAIRS, discount), 1e-6 / (1.0 - discount), 100_000);
         assert_eq!(found.ended, EndReason::Precision, "{:?}", found.bracket);
     }
     // An average of a reward a step does not depend on the discount by more than one repair.
     let values = [0.999, 0.9999].map(|discount| {
-        let (found, _) = solved(&repairs(3, discount), 1e-3, 100_000);
+        let (found, _) = solved(&at(REPAIRS, discount), 1e-3, 100_000);
         found.bracket.lower * (1.0 - discount)
     });
     assert!((values[0] - values[1]).abs() < 20.0 * 1e-3, "{values:?}");
@@ -100,7 +73,7 @@ fn acts_again_and_again_are_solved_at_every_discount() {
 #[test]
 fn a_policy_of_few_vectors_earns_what_is_said_of_it() {
     let tiger = Pomdp::parse(TIGER).unwrap();
-    let mut models = vec![("tiger", tiger, 9), ("repairs", repairs(4, 0.95), 60)];
+    let mut models = vec![("tiger", tiger, 9), ("repairs", at(REPAIRS, 0.95), 60)];
     if let Some(folder) = public::folder() {
         models.push(("hallway", public::read(&folder, "hallway"), 60));
     }
@@ -159,7 +132,7 @@ fn what_a_policy_earns_lies_between_its_bounds() {
     assert_eq!((found.beliefs, found.beyond), (5, 0.0));
     assert!((found.lower - 19.371_368_38).abs() < 1e-6 && found.upper - found.lower < 1e-9);
     // One that is not the best, and its simulation.
-    let model = repairs(3, 0.95);
+    let model = at(REPAIRS, 0.95);
     let few = compact(
         &model,
         &solved(&model, 1e-3, 20_000).0.vectors.unwrap(),
