@@ -30,7 +30,7 @@ pub use alpha_vectors::AlphaVectors;
 pub use belief::{Evidence, Tracker};
 pub use bounds::mdp;
 pub use budget::Budget;
-pub use model::{Pomdp, Warning};
+pub use model::{Pomdp, Process, Warning};
 pub use parse_error::{ParseError, Position};
 pub use policy::{
     ActionVoting, Choice, Control, Decider, MostLikelyState, PointBased, Policy, QMdp,

@@ -3,6 +3,7 @@
 mod build;
 mod hash;
 mod joint;
+mod process;
 pub(crate) mod rewards;
 pub(crate) mod sparse;
 
@@ -10,6 +11,7 @@ pub use build::Probabilities;
 #[cfg(feature = "solver")]
 pub(crate) use build::ROW_SUM_WARNING;
 pub(crate) use build::{Parts, ROW_SUM_TOLERANCE, refuse_sum};
+pub use process::{Process, ProcessError};
 
 use crate::parse_error::Position;
 use joint::Joint;

@@ -12,6 +12,7 @@ mod point_based;
 mod policy_file;
 mod policy_graph;
 mod pomdpx;
+mod process;
 mod public;
 mod reference;
 mod round_trip;
