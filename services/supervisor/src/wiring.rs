@@ -1,7 +1,7 @@
 //! The supervisor at its ports.
 
 use vigil_blocks::{
-    Action, Cause, CauseKind, DetectionBelief, Entry, EventKind, FaultBelief, Weighing,
+    Action, Cause, CauseKind, ControlMode, DetectionBelief, Entry, EventKind, FaultBelief, Weighing,
 };
 use vigil_cycle::{
     Clock, Graph, HealthBoard, InputAccount, Intake, PortError, Receiver, Sender, Stage, Stamp,
@@ -168,7 +168,11 @@ impl Stage for SupervisorStage {
             action: action.action,
             wheel: action.wheel,
             p: action.belief[..states].iter().copied().fold(0.0, f64::max),
-            weighing: Weighing::new(action),
+            // A stop by rule was weighed from nothing.
+            weighing: match action.control_mode == ControlMode::Safe as u32 {
+                true => None,
+                false => Weighing::new(action),
+            },
         };
         self.action.send(stamp, clock)
     }

@@ -37,7 +37,8 @@ block! {
         pub action_entropy: f64,
         /// Value of the chosen action minus the runner-up's.
         pub margin: f64,
-        /// Natural logarithm of the probability of the last evidence under the belief.
+        /// How well the last evidence was predicted: with symptoms the natural logarithm of its
+        /// probability; with faults the mean of that of the predicted belief, over the belief.
         pub log_evidence: f64,
         /// Speed factor to apply, 0..1.
         pub speed_scale: f64,

@@ -2,6 +2,7 @@
 
 use vigil_blocks::{Action, ControlMode, DetectionBelief, FAULT_NODES, FaultBelief, RecoveryKind};
 use vigil_pomdp::policy::Measure;
+use vigil_pomdp::{Choice, Control};
 use vigil_robot::{Description, FaultTree};
 
 use crate::alarm_fusion::Situation;
@@ -20,20 +21,46 @@ use crate::switching_cost::SwitchingCost;
 /// of its range. Smaller decides in almost every cycle; larger lets a decision wait for its epoch.
 const MOVED: f64 = 0.05;
 
+/// A fault is named above this probability: more likely than not.
+const NAMED: f64 = 0.5;
+
+/// Tells when an epoch is over.
+struct EpochClock {
+    epoch_ns: u64,
+    /// Capture time at which the present epoch began.
+    t_capture_ns: Option<u64>,
+}
+
+impl EpochClock {
+    /// True once per epoch, by differences of the capture time; a jump back begins a new epoch.
+    fn is_over(&mut self, t_capture_ns: u64) -> bool {
+        let over = self.t_capture_ns.is_none_or(|began_ns| {
+            t_capture_ns
+                .checked_sub(began_ns)
+                .is_none_or(|passed| passed >= self.epoch_ns)
+        });
+        if over {
+            self.t_capture_ns = Some(t_capture_ns);
+        }
+        over
+    }
+}
+
 /// Takes over the identifier's belief, tracks how old the unknown is, and chooses actions.
 pub(crate) struct FaultDecision {
     process: DecisionProcess,
     tree_hash: u64,
     states: Vec<StateMeaning>,
     leaves: Vec<Leaf>,
-    /// Probability of every node of the tree, as last diagnosed.
+    /// Probability of every node of the tree, as of the last decision.
     p: [f64; FAULT_NODES],
     compensation: Vec<Compensation>,
-    epoch_ns: u64,
-    epoch_t_capture_ns: Option<u64>,
-    decision_t_capture_ns: u64,
+    epoch_clock: EpochClock,
+    decision_t_capture_ns: Option<u64>,
     latch: Latch,
     switching: SwitchingCost,
+    /// The wheel that the present action is about.
+    wheel: Option<usize>,
     instruction: Option<Instruction>,
 }
 
@@ -58,11 +85,14 @@ impl FaultDecision {
             leaves,
             p: [0.0; FAULT_NODES],
             compensation,
-            epoch_ns: (settings.epoch_ms * 1e6) as u64,
-            epoch_t_capture_ns: None,
-            decision_t_capture_ns: 0,
+            epoch_clock: EpochClock {
+                epoch_ns: (settings.epoch_ms * 1e6) as u64,
+                t_capture_ns: None,
+            },
+            decision_t_capture_ns: None,
             latch: Latch::default(),
             switching: SwitchingCost::new(settings.switching_cost),
+            wheel: None,
             instruction: None,
         };
         rule.begin();
@@ -77,21 +107,17 @@ impl FaultDecision {
             *weight = is_nominal(meaning);
         }
         self.process.tracker.anchor(&self.process.scratch);
-        self.process.choice = self
-            .process
-            .decider
-            .decide(self.process.tracker.belief())
-            .choice();
+        self.p = [0.0; FAULT_NODES];
+        self.decision_t_capture_ns = None;
         self.switching.forget();
+        let best = self.process.decider.decide(self.process.tracker.belief());
+        self.choose(best.choice());
     }
 
     fn take_diagnosis(&mut self, diagnosis: &FaultBelief, alarm: bool) {
-        if diagnosis.run_id != self.process.run_id {
-            self.reset();
-            self.process.run_id = diagnosis.run_id;
-        }
+        self.begin_run(diagnosis.run_id);
         let t_capture_ns = diagnosis.header.t_capture_ns;
-        let timed = self.epoch_is_over(t_capture_ns);
+        let timed = self.epoch_clock.is_over(t_capture_ns);
         let process = &mut self.process;
         // A call is one step of the model, however long it takes: it ends with a reset.
         if timed && self.latch.action().is_none() {
@@ -104,75 +130,112 @@ impl FaultDecision {
         normalise(weights);
         if timed {
             process.log_evidence = log_score(before, weights);
-        } else if distance(before, weights) <= MOVED && process.control_mode == ControlMode::Policy
-        {
+        }
+        let has_moved = distance(before, weights) > MOVED || self.wheels_have_moved(diagnosis);
+        if !(timed || has_moved || self.process.control_mode != ControlMode::Policy) {
             return;
         }
+        let process = &mut self.process;
         process.control_mode = ControlMode::Policy;
-        process.tracker.anchor(weights);
+        process.tracker.anchor(&process.scratch);
         self.p = diagnosis.p;
         self.decide(t_capture_ns);
     }
 
-    /// True once per epoch, by differences of the capture time; a jump back begins a new epoch.
-    fn epoch_is_over(&mut self, t_capture_ns: u64) -> bool {
-        let over = self.epoch_t_capture_ns.is_none_or(|last_ns| {
-            t_capture_ns
-                .checked_sub(last_ns)
-                .is_none_or(|passed| passed >= self.epoch_ns)
-        });
-        if over {
-            self.epoch_t_capture_ns = Some(t_capture_ns);
+    fn begin_run(&mut self, run_id: u64) {
+        if run_id != self.process.run_id {
+            self.reset();
+            self.process.run_id = run_id;
         }
-        over
+    }
+
+    /// Leaves of one state are treated alike, but for the wheel.
+    fn wheels_have_moved(&self, diagnosis: &FaultBelief) -> bool {
+        let of_wheels = self.leaves.iter().filter(|leaf| leaf.wheel.is_some());
+        let at = |p: &[f64], node: usize| p.get(node).copied().unwrap_or(0.0);
+        of_wheels
+            .map(|leaf| (at(&diagnosis.p, leaf.node) - at(&self.p, leaf.node)).abs())
+            .any(|moved| moved > MOVED)
     }
 
     /// The identifier is lost. The detector says how probable a fault is, the belief before the
-    /// loss which one. Before an alarm the detector's odds mean nothing.
+    /// loss which one, and without that it is unknown. Before an alarm the detector's odds mean
+    /// nothing.
     fn fall_back(&mut self, detection: &DetectionBelief, alarm: bool) {
+        self.begin_run(detection.run_id);
+        let t_capture_ns = detection.header.t_capture_ns;
+        let process = &mut self.process;
+        if self.epoch_clock.is_over(t_capture_ns) && self.latch.action().is_none() {
+            let action = process.choice.action;
+            process.tracker.predict(&process.model, action);
+        }
         let p_fault = match alarm {
             true => detection.p_fault.clamp(0.0, 1.0),
             false => 0.0,
         };
-        let belief = self.process.tracker.belief();
-        let is_nominal = |meaning: &StateMeaning| meaning.subject == Subject::Nominal;
-        let faulty: f64 = belief
-            .iter()
-            .zip(&self.states)
-            .filter(|(_, m)| !is_nominal(m))
-            .map(|(b, _)| b)
-            .sum();
-        let others = self.states.iter().filter(|m| !is_nominal(m)).count() as f64;
-        let scratch = self.process.scratch.iter_mut();
-        for ((weight, b), meaning) in scratch.zip(belief).zip(&self.states) {
-            *weight = if is_nominal(meaning) {
-                1.0 - p_fault
-            } else if faulty > 0.0 {
-                p_fault * b / faulty
-            } else {
-                p_fault / others
+        let is_fault =
+            |meaning: &StateMeaning| !matches!(meaning.subject, Subject::Nominal | Subject::Done);
+        let belief = process.tracker.belief();
+        let of_faults = belief.iter().zip(&self.states).filter(|(_, m)| is_fault(m));
+        let faulty: f64 = of_faults.map(|(b, _)| b).sum();
+        let unknown = |m: &StateMeaning| m.subject == Subject::Unknown;
+        let unknown = self.states.iter().position(unknown);
+        let scratch = process.scratch.iter_mut().enumerate();
+        for (((state, weight), b), meaning) in scratch.zip(belief).zip(&self.states) {
+            *weight = match meaning.subject {
+                Subject::Nominal => 1.0 - p_fault,
+                Subject::Done => 0.0,
+                _ if faulty > 0.0 => p_fault * (b / faulty),
+                _ if Some(state) == unknown => p_fault,
+                _ => 0.0,
             };
         }
-        self.process.tracker.anchor(&self.process.scratch);
-        self.process.control_mode = ControlMode::Fallback;
-        self.decide(detection.header.t_capture_ns);
+        process.tracker.anchor(&process.scratch);
+        process.control_mode = ControlMode::Fallback;
+        process.log_evidence = 0.0;
+        self.decide(t_capture_ns);
     }
 
     fn decide(&mut self, t_capture_ns: u64) {
-        let passed_ns = t_capture_ns.saturating_sub(self.decision_t_capture_ns);
-        self.decision_t_capture_ns = t_capture_ns;
-        let share = (passed_ns as f64 / self.epoch_ns as f64).min(1.0);
+        let before = self.decision_t_capture_ns.replace(t_capture_ns);
+        let share = before.map_or(1.0, |before_ns| {
+            let passed_ns = t_capture_ns.saturating_sub(before_ns);
+            (passed_ns as f64 / self.epoch_clock.epoch_ns as f64).min(1.0)
+        });
         let process = &mut self.process;
-        let mut best = process.decider.decide(process.tracker.belief()).choice();
-        if process.decider.measure() == Measure::Value {
-            let (held, values) = (process.choice.action, process.decider.values());
-            if !self.switching.is_due(held, best.action, values, share) && best.action != held {
-                best = stands(held);
-            }
+        let best = process.decider.decide(process.tracker.belief()).choice();
+        let held = process.choice;
+        // A step for information lasts as long as it is asked for.
+        let is_free = process.decider.measure() != Measure::Value || held.control == Control::Dual;
+        if is_free {
+            self.switching.forget();
+            return self.choose(best);
         }
+        let values = process.decider.values();
+        let is_due = self
+            .switching
+            .is_due(held.action, best.action, values, share);
+        self.choose(match is_due || best.action == held.action {
+            true => best,
+            false => stands(held.action),
+        });
+    }
+
+    fn choose(&mut self, best: Choice) {
+        let process = &mut self.process;
         let actions = &process.actions;
         let kind = |action: usize| actions.get(action).map_or(RecoveryKind::Stop, |m| m.kind);
-        process.choice = self.latch.choose(best, kind);
+        let before = std::mem::replace(&mut process.choice, self.latch.choose(best, kind)).action;
+        let action = process.choice.action;
+        let about = match process.kind(action) {
+            RecoveryKind::Compensate => self.most_probable_wheel(LeafKind::Stuck),
+            RecoveryKind::IgnoreEncoder => self.most_probable_wheel(LeafKind::Encoder),
+            _ => return self.wheel = None,
+        };
+        // Another wheel than that of the action that goes on has to be more likely than not.
+        let held = self.wheel.filter(|_| action == before);
+        let other = about.filter(|(_, p)| held.is_none() || *p > NAMED);
+        self.wheel = other.map(|(wheel, _)| wheel).or(held);
     }
 
     fn instruction(&self) -> Instruction {
@@ -181,27 +244,26 @@ impl FaultDecision {
         }
         let action = self.process.choice.action;
         let kind = self.process.kind(action);
-        let wheel = match kind {
-            RecoveryKind::Compensate => self.most_probable_wheel(LeafKind::Stuck),
-            RecoveryKind::IgnoreEncoder => self.most_probable_wheel(LeafKind::Encoder),
-            _ => None,
-        };
         Instruction {
             action,
             kind,
-            wheel,
+            wheel: self.wheel,
         }
     }
 
-    fn most_probable_wheel(&self, kind: LeafKind) -> Option<usize> {
-        let mut best = (None, 0.0);
+    /// The wheel with such a fault, and its probability.
+    fn most_probable_wheel(&self, kind: LeafKind) -> Option<(usize, f64)> {
+        let mut best: Option<(usize, f64)> = None;
         for leaf in self.leaves.iter().filter(|leaf| leaf.kind == kind) {
             let p = self.p.get(leaf.node).copied().unwrap_or(0.0);
-            if leaf.wheel.is_some() && p > best.1 {
-                best = (leaf.wheel, p);
-            }
+            let is_more = p > best.map_or(0.0, |(_, most)| most);
+            best = leaf
+                .wheel
+                .filter(|_| is_more)
+                .map(|wheel| (wheel, p))
+                .or(best);
         }
-        best.0
+        best
     }
 }
 
@@ -271,7 +333,7 @@ impl DecisionRule for FaultDecision {
     fn reset(&mut self) {
         self.process.reset();
         self.latch.release();
-        self.epoch_t_capture_ns = None;
+        self.epoch_clock.t_capture_ns = None;
         self.begin();
     }
 

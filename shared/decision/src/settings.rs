@@ -11,8 +11,8 @@ use vigil_blocks::RecoveryKind;
 #[derive(Debug, Clone, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// What updates the belief over the decision model's states: `faults` if they are the leaves of
-    /// the fault tree, `symptoms` if the model's observations are sets of symptoms and outcomes
+    /// What updates the belief over the decision model's states: `faults` if they are leaves, nodes
+    /// or kinds of the fault tree, `symptoms` if the model's observations are sets of symptoms and outcomes
     /// (`EPM_LD`, `none`).
     pub evidence: Evidence,
     /// With `symptoms`: the state that means a hardware fault; the identifier's belief in any fault

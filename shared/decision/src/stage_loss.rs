@@ -46,9 +46,9 @@ impl StageLossMonitor {
     }
 
     /// A diagnosis has come that makes up for a missing detection; true if the identifier was lost.
-    pub(crate) const fn diagnosis(&mut self) -> bool {
+    pub(crate) const fn diagnosis(&mut self) {
         self.misses_without_detection = 0;
-        self.diagnosis_alone()
+        self.diagnosis_alone();
     }
 
     /// A diagnosis has come, which holds no symptoms; true if the identifier was lost.
@@ -102,9 +102,9 @@ mod tests {
         detected.detection();
         assert_eq!(detected.lost_stages(), 1);
         let mut diagnosed = lost();
-        assert!(diagnosed.diagnosis());
+        diagnosed.diagnosis();
         assert_eq!(diagnosed.lost_stages(), 0);
-        assert!(!diagnosed.diagnosis());
+        diagnosed.diagnosis();
         let mut alone = lost();
         assert!(alone.diagnosis_alone());
         assert_eq!(alone.lost_stages(), 2);

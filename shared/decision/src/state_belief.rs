@@ -18,6 +18,9 @@ use crate::states::{StateMeaning, Subject};
 /// Smaller might refuse sound input; larger might take damaged input.
 pub(crate) const P_TOLERANCE: f64 = 1e-6;
 
+/// A diagnosis says at least this much in all; a sound one sums to 1 or more.
+const P_SUM_MIN: f64 = 0.5;
+
 /// Writes the identifier's belief over the states into `weights`, which need not sum to 1;
 /// `predicted` is the decision model's own belief.
 pub(crate) fn write_weights(
@@ -89,7 +92,7 @@ fn share_unknown(states: &[StateMeaning], predicted: &[f64], weights: &mut [f64]
             weight = *share;
         }
         *share = match (sum > 0.0, at) {
-            (true, _) => weight * b / sum,
+            (true, _) => weight * (b / sum),
             (false, 0) => weight,
             (false, _) => 0.0,
         };
@@ -107,7 +110,7 @@ fn reported(diagnosis: &FaultBelief) -> impl Iterator<Item = &FaultSet> {
 }
 
 /// True if a diagnosis is about the tree with `tree_hash`, and what it says of every state and set
-/// are probabilities, that of some state more than 0.
+/// are probabilities, together those of something.
 pub(crate) fn is_sound(diagnosis: &FaultBelief, states: &[StateMeaning], tree_hash: u64) -> bool {
     let is_probability = |p: f64| (0.0..=1.0 + P_TOLERANCE).contains(&p);
     let own = [diagnosis.p[0], diagnosis.p_unknown];
@@ -124,7 +127,7 @@ pub(crate) fn is_sound(diagnosis: &FaultBelief, states: &[StateMeaning], tree_ha
         .iter()
         .map(|m| probability(diagnosis, *m, true))
         .sum();
-    are_probabilities && sum > 0.0 && diagnosis.tree_hash == tree_hash
+    are_probabilities && sum >= P_SUM_MIN && diagnosis.tree_hash == tree_hash
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ pub struct Supervisor {
 
 impl Supervisor {
     /// Builds a supervisor for a decision model. With `settings.evidence` of faults, its states are
-    /// the leaves of `tree`; of symptoms, its observations are sets of them. `solved` is what the
+    /// leaves, nodes or kinds of `tree`; of symptoms, its observations are sets of them. `solved` is what the
     /// policy `point-based` decides by; the others do without. After `blind_after_misses` misses in
     /// a row without any detection no belief is usable, and the robot stops.
     ///

@@ -34,7 +34,8 @@ impl SwitchingCost {
             *regret = (*regret + share * (value - own)).max(0.0);
         }
         let lost = self.regret.get(best).copied().unwrap_or(f64::INFINITY);
-        let is_due = held != best && lost >= self.cost;
+        let gain = values.get(best).map_or(f64::INFINITY, |value| value - own);
+        let is_due = held != best && lost.max(gain) >= self.cost;
         if is_due {
             self.forget();
         }
@@ -73,8 +74,11 @@ mod tests {
         assert_eq!(held(0.0, &[little, less, little]), [1, 0, 1]);
         // Half an epoch counts half.
         let mut switching = SwitchingCost::new(1.0);
-        assert!(!switching.is_due(0, 1, &much, 0.25));
-        assert!(switching.is_due(0, 1, &much, 0.25));
+        assert!(!switching.is_due(0, 1, &little, 1.0));
+        assert!(!switching.is_due(0, 1, &little, 0.5));
+        assert!(switching.is_due(0, 1, &little, 0.5));
+        // What is worth it in one epoch is taken at once.
+        assert!(switching.is_due(0, 1, &much, 0.01));
         // Equal ones are not worth a change, whatever it costs.
         assert_eq!(held(0.0, &[[1.0, 1.0]]), [0]);
     }

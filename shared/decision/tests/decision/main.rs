@@ -4,6 +4,7 @@
 
 use vigil_cycle::allocation::CountingAllocator;
 
+mod changes;
 mod decisions;
 mod exceptions;
 mod hardware;

@@ -126,7 +126,11 @@ impl Pomdp {
         }
         let states = names("states", process.states(), 1)?;
         let actions = names("actions", process.actions(), 1)?;
-        let observations = names("observations", process.observations(), 0)?;
+        let mut observations = names("observations", process.observations(), 0)?;
+        let is_mdp = observations.is_empty();
+        if is_mdp {
+            observations.push("none".to_owned());
+        }
         let (n, k) = (states.len(), observations.len());
         let start = dense(process.start(), n, || "the start".to_owned())?;
         let (mut transitions, mut observation) = (Vec::new(), Vec::new());
@@ -134,7 +138,7 @@ impl Pomdp {
             Vec::new(),
             BlockSize {
                 next: n,
-                observations: k.max(1),
+                observations: k,
             },
         );
         for (a, action) in actions.iter().enumerate() {
@@ -144,11 +148,12 @@ impl Pomdp {
                 let name = |table: &str| format!("{table} of {action} in {state}");
                 let row = dense(process.transition(s, a), n, || name("T"))?;
                 rows.push(row.into_iter().enumerate().filter(|(_, p)| *p > 0.0));
-                if k > 0 {
-                    let row = dense(process.observation(a, s), k, || name("Z"))?;
-                    for (z, p) in row.into_iter().enumerate() {
-                        columns[z * n + s] = p;
-                    }
+                let seen = match is_mdp {
+                    true => vec![(0, 1.0)],
+                    false => process.observation(a, s),
+                };
+                for (z, p) in dense(seen, k, || name("Z"))?.into_iter().enumerate() {
+                    columns[z * n + s] = p;
                 }
                 let reward = process.reward(s, a);
                 if !reward.is_finite() {
@@ -177,7 +182,7 @@ impl Pomdp {
             start_at: at,
             transitions,
             observation,
-            row_at: [vec![at; rows], vec![at; if k > 0 { rows } else { 0 }]],
+            row_at: [vec![at; rows], vec![at; rows]],
             warnings: Vec::new(),
         })
         .map_err(|error| ProcessError::Row {

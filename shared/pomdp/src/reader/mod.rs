@@ -15,7 +15,6 @@ mod rules;
 mod start;
 
 use cursor::Cursor;
-#[cfg(feature = "pomdpx")]
 pub(crate) use cursor::is_reserved;
 
 use crate::model::{Parts, Pomdp};

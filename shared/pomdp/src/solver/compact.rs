@@ -60,18 +60,26 @@ pub fn compact(
     vectors_max: usize,
     budget: &mut Budget<'_>,
 ) -> Result<Compact, SolveError> {
+    if vectors.len() <= vectors_max {
+        return Ok(Compact {
+            vectors: vectors.clone(),
+            loss_mean: 0.0,
+            loss_error: 0.0,
+        });
+    }
     let mut choice = Choice::new(model, vectors);
     let mut beliefs = choice.reach(budget)?;
     choice.add(&beliefs, vectors_max.max(1), budget)?;
-    let mut losses = choice.run(budget)?;
-    for _ in 0..ROUNDS_MAX {
+    let mut losses = choice.run(0, budget)?;
+    for round in 1..=ROUNDS_MAX as u64 {
         let before = choice.kept.len();
         beliefs = std::mem::take(&mut losses.beliefs);
         choice.add(&beliefs, vectors_max.max(1), budget)?;
         if choice.kept.len() == before {
             break;
         }
-        losses = choice.run(budget)?;
+        // Other runs than those that the vectors were chosen by.
+        losses = choice.run(round, budget)?;
     }
     let vectors = choice
         .vectors()
@@ -215,8 +223,8 @@ impl<'m> Choice<'m> {
     }
 
     /// Runs of the policy that is kept, from the start: what it loses, and where.
-    fn run(&mut self, budget: &mut Budget<'_>) -> Result<Losses, StopRequest> {
-        let mut random = Pcg64Mcg::seed_from_u64(1);
+    fn run(&mut self, seed: u64, budget: &mut Budget<'_>) -> Result<Losses, StopRequest> {
+        let mut random = Pcg64Mcg::seed_from_u64(seed);
         let (mut steps, began) = (0, budget.spent());
         let (mut sums, mut beliefs) = (Vec::new(), Vec::new());
         while steps < STEPS_MAX && budget.spent() < began + PRODUCTS_MAX as u64 {
@@ -233,8 +241,9 @@ impl<'m> Choice<'m> {
                 let next = self.draw(&belief, self.plans[plan].0, random.random(), budget)?;
                 discount *= self.model.discount();
                 steps += 1;
-                if next == belief {
-                    // It stays there for ever.
+                let action = self.plans[plan].0;
+                if next == belief && self.stays(&belief, action, budget)? {
+                    // For ever.
                     sum += discount * loss / (1.0 - self.model.discount());
                     break;
                 }
@@ -250,6 +259,24 @@ impl<'m> Choice<'m> {
             error: (squares / (count - 1.0).max(1.0) / count).sqrt(),
             beliefs,
         })
+    }
+
+    /// True if no other belief may follow.
+    fn stays(
+        &mut self,
+        belief: &SparseBelief,
+        action: usize,
+        budget: &mut Budget<'_>,
+    ) -> Result<bool, StopRequest> {
+        let mut stays = true;
+        let work = self
+            .followers
+            .each(self.model, belief, action, |follower| {
+                stays &= follower.belief == belief.as_slice();
+                Ok(())
+            })?;
+        budget.spend(work)?;
+        Ok(stays)
     }
 
     /// The belief that follows where a number between 0 and 1 says what is observed.

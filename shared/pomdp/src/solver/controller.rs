@@ -254,8 +254,9 @@ impl Tree<'_> {
             .residual(&values)
             .into_iter()
             .fold(0.0_f64, |m, r| m.max(-r));
-        let error = short / (1.0 - model.discount() * mass_max);
-        if error.is_nan() || error < 0.0 {
+        let contraction = 1.0 - model.discount() * mass_max;
+        let error = short / contraction;
+        if !error.is_finite() || contraction <= 0.0 {
             return Err(SolveError::Unbounded(model.discount()));
         }
         values.iter_mut().for_each(|v| *v -= error);

@@ -16,7 +16,7 @@ const VISITED_MAX: usize = 1000;
 const EXPANDED_MAX: usize = 30;
 
 impl Tree<'_> {
-    /// Expands at the edge, then backs up the beliefs that are visited most.
+    /// Expands at the edge, then backs up the most probable beliefs, those that are far first.
     pub(super) fn advance_frontier(
         &mut self,
         root: BeliefId,

@@ -247,9 +247,10 @@ impl Tree<'_> {
         }
         for (s, _) in belief {
             let corner = self.node(&[(s, 1.0)], budget)?;
-            if let Some(to) = at(corner) {
-                parts.push((*to as usize, rest.get(&s).copied().unwrap_or(0.0)));
-            }
+            let to = at(corner);
+            assert!(to.is_some(), "corners are part of the process: state {s}");
+            let weight = rest.get(&s).copied().unwrap_or(0.0);
+            parts.extend(to.map(|to| (*to as usize, weight)));
         }
         Ok(parts)
     }
@@ -297,8 +298,9 @@ impl Tree<'_> {
         let excess = (0..values.len())
             .map(|belief| choices.best(belief, discount, &values).1 - values[belief])
             .fold(0.0, f64::max);
-        let error = excess / (1.0 - discount * choices.mass_max);
-        if error.is_nan() || error < 0.0 {
+        let contraction = 1.0 - discount * choices.mass_max;
+        let error = excess / contraction;
+        if !error.is_finite() || contraction <= 0.0 {
             return Err(SolveError::Unbounded(discount));
         }
         values.iter_mut().for_each(|v| *v += error);

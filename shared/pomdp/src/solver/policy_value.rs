@@ -200,8 +200,9 @@ impl Chain {
         let x = system.solve_roughly(vec![0.0; right.len()], budget)?;
         let left = system.residual(&x).into_iter();
         let error = left.fold(0.0_f64, |most, r| most.max(r.abs()));
-        let error = error / (1.0 - self.discount * self.mass_max);
-        if error.is_nan() || error < 0.0 {
+        let contraction = 1.0 - self.discount * self.mass_max;
+        let error = error / contraction;
+        if !error.is_finite() || contraction <= 0.0 {
             return Err(SolveError::Unbounded(self.discount));
         }
         let first = x.first().copied().unwrap_or(0.0);

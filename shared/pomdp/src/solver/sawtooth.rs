@@ -156,7 +156,7 @@ impl Sawtooth {
                 continue;
             }
             let based = &self.based[slot * actions..][..actions];
-            // However large c is, the value is at least the larger of two lines in c.
+            // However large c is, the value is at least the smaller of two lines in c.
             let fall_fast = based[strongest] - point.value;
             let fall_plane = point.plane - point.value;
             let mut c = 1.0_f64;

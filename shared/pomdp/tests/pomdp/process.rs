@@ -21,6 +21,7 @@ enum Change {
     State(usize),
     Negative,
     Reward,
+    NoObservations,
 }
 
 impl Process for Copied<'_> {
@@ -44,7 +45,10 @@ impl Process for Copied<'_> {
     }
 
     fn observations(&self) -> Vec<String> {
-        self.model.observations().to_vec()
+        match self.change {
+            Change::NoObservations => Vec::new(),
+            _ => self.model.observations().to_vec(),
+        }
     }
 
     fn start(&self) -> Vec<(usize, f64)> {
@@ -116,6 +120,18 @@ fn a_model_in_code_is_that_of_its_file() {
             assert_same(&found, &model);
         }
     }
+}
+
+#[test]
+fn a_process_without_observations_is_an_mdp() {
+    let model = Pomdp::parse(MDP).unwrap();
+    let copied = Copied {
+        model: &model,
+        change: Change::NoObservations,
+    };
+    let found = Pomdp::from_process(&copied).unwrap();
+    assert!(found.is_mdp());
+    assert_same(&found, &model);
 }
 
 #[test]

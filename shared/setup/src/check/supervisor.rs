@@ -106,6 +106,10 @@ fn policy(settings: &Settings, report: &mut impl FnMut(&str, String)) {
         );
         report(key, message);
     }
+    if settings.switching_cost > 0.0 && settings.evidence == Evidence::Symptoms {
+        let message = "has a meaning only with supervisor.evidence = \"faults\"";
+        report("supervisor.switching_cost", message.to_owned());
+    }
     for (i, name) in named.iter().enumerate() {
         if named[..i].contains(name) {
             report(key, format!("'{name}' appears twice"));

@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use vigil_cycle::clock::process_cpu_s;
 use vigil_cycle::signal;
+use vigil_pomdp::mdp::SolveError;
 use vigil_pomdp::policy_file::{PolicyFile, alpha, appl};
 use vigil_pomdp::solver::{Answer, EndReason, Method, Options, Progress, bound, compact};
 use vigil_pomdp::{AlphaVectors, Budget, Pomdp};
 
+use super::compare::count;
 use super::{load, print, save};
 use vigil_terminal::{CommandError, Outcome};
 
@@ -64,8 +66,8 @@ pub struct Args {
     out: Option<PathBuf>,
     /// Vectors of the policy that is written, at most: those that lose least, as a live decision
     /// takes as long as it has vectors. What they lose is sampled, and said.
-    #[arg(long, value_name = "N", default_value_t = 200)]
-    vectors_max: usize,
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = count(1))]
+    vectors_max: u64,
     /// Print one JSON document.
     #[arg(long)]
     json: bool,
@@ -147,8 +149,8 @@ struct Exported {
     vectors: AlphaVectors,
 }
 
-/// The policy of an answer, with no more vectors than are asked for. Choosing them takes some
-/// seconds at most beyond the time that was given; Ctrl-C ends it.
+/// The policy of an answer, with no more vectors than are asked for, unless Ctrl-C has ended the
+/// search: choosing them takes some seconds beyond the time that was given.
 fn policy(args: &Args, model: &Pomdp, answer: &Answer) -> Result<Exported, CommandError> {
     let (Some(vectors), Some(lower)) = (&answer.vectors, answer.lower) else {
         let message = "--out: ended before there was a policy; give it more time by --timeout";
@@ -158,14 +160,21 @@ fn policy(args: &Args, model: &Pomdp, answer: &Answer) -> Result<Exported, Comma
     let small = compact(
         model,
         vectors,
-        args.vectors_max,
+        args.vectors_max as usize,
         &mut Budget::new(&mut stop),
-    )
-    .map_err(|error| CommandError::failure(format!("--vectors-max: {error}")))?;
-    Ok(Exported {
-        lower: lower - small.loss_mean - LOSS_ERRORS * small.loss_error,
-        vectors: small.vectors,
-    })
+    );
+    match small {
+        Ok(small) => Ok(Exported {
+            lower: lower - small.loss_mean - LOSS_ERRORS * small.loss_error,
+            vectors: small.vectors,
+        }),
+        // Whoever ends the search wants what there is.
+        Err(SolveError::Stopped) => Ok(Exported {
+            lower,
+            vectors: vectors.clone(),
+        }),
+        Err(error) => Err(CommandError::failure(format!("--vectors-max: {error}"))),
+    }
 }
 
 fn check(args: &Args) -> Result<(), CommandError> {

@@ -88,7 +88,7 @@ fn sample(
     model: &Pomdp,
     policy: &PointBased,
     steps_max: usize,
-) -> Result<Summary, CommandError> {
+) -> Result<(Summary, u64), CommandError> {
     let solution = mdp::solve(model).map_err(CommandError::usage)?;
     let no_dual = |information| Dual::new(information, 1.0);
     let decider = PolicyKind::PointBased
@@ -105,15 +105,17 @@ fn sample(
         progress.show(number as usize);
         drive(model, &mut agent, &rules, Episode { seed, number }).discounted
     };
-    let mut earned: Vec<f64> = (0..args.episodes).map(earned).collect();
-    Ok(Summary::new(&mut earned))
+    // Ctrl-C ends it after the mission that runs; an interval needs two.
+    let goes_on = |number: &u64| *number < 2 || !signal::stop_requested();
+    let mut earned: Vec<f64> = (0..args.episodes).take_while(goes_on).map(earned).collect();
+    Ok((Summary::new(&mut earned), earned.len() as u64))
 }
 
 fn document(
     args: &Args,
     model: &Pomdp,
     certain: &PolicyValue,
-    sampled: Summary,
+    sampled: (Summary, u64),
     steps_max: usize,
 ) -> Document {
     Document {
@@ -125,12 +127,12 @@ fn document(
         upper: certain.upper,
         beliefs: certain.beliefs,
         beyond_share: certain.beyond,
-        episodes: args.episodes,
+        episodes: sampled.1,
         seed: args.seed,
         steps_max,
         weight_beyond_horizon: model.discount().powf(steps_max as f64),
-        mean: sampled.mean,
-        half_width_95: sampled.half_width,
+        mean: sampled.0.mean,
+        half_width_95: sampled.0.half_width,
     }
 }
 
