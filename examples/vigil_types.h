@@ -468,7 +468,7 @@ typedef struct {
   double action_entropy;
   /* Value of the chosen action minus the runner-up's. */
   double margin;
-  /* Natural logarithm of the probability of the last evidence under the belief. */
+  /* How well the last evidence was predicted: with symptoms the natural logarithm of its probability; with faults the mean of that of the predicted belief, over the belief. */
   double log_evidence;
   /* Speed factor to apply, 0..1. */
   double speed_scale;

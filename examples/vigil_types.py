@@ -523,7 +523,7 @@ class Action(ctypes.LittleEndianStructure):
         ("action_entropy", ctypes.c_double),
         # Value of the chosen action minus the runner-up's.
         ("margin", ctypes.c_double),
-        # Natural logarithm of the probability of the last evidence under the belief.
+        # How well the last evidence was predicted: with symptoms the natural logarithm of its probability; with faults the mean of that of the predicted belief, over the belief.
         ("log_evidence", ctypes.c_double),
         # Speed factor to apply, 0..1.
         ("speed_scale", ctypes.c_double),

@@ -12,8 +12,8 @@ use vigil_blocks::RecoveryKind;
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     /// What updates the belief over the decision model's states: `faults` if they are leaves, nodes
-    /// or kinds of the fault tree, `symptoms` if the model's observations are sets of symptoms and outcomes
-    /// (`EPM_LD`, `none`).
+    /// or kinds of the fault tree, `symptoms` if the model's observations are sets of symptoms and
+    /// outcomes (`EPM_LD`, `none`).
     pub evidence: Evidence,
     /// With `symptoms`: the state that means a hardware fault; the identifier's belief in any fault
     /// of its tree is soft evidence for it. Without one the identifier is not used.

@@ -23,9 +23,10 @@ pub struct Supervisor {
 
 impl Supervisor {
     /// Builds a supervisor for a decision model. With `settings.evidence` of faults, its states are
-    /// leaves, nodes or kinds of `tree`; of symptoms, its observations are sets of them. `solved` is what the
-    /// policy `point-based` decides by; the others do without. After `blind_after_misses` misses in
-    /// a row without any detection no belief is usable, and the robot stops.
+    /// leaves, nodes or kinds of `tree`; of symptoms, its observations are sets of them. `solved`
+    /// is what the policy `point-based` decides by; the others do without. After
+    /// `blind_after_misses` misses in a row without any detection no belief is usable, and the
+    /// robot stops.
     ///
     /// # Errors
     /// [`SupervisorError`] naming what does not fit.

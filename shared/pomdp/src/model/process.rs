@@ -114,8 +114,8 @@ pub enum ProcessError {
 }
 
 impl Pomdp {
-    /// The model of a process, each of whose functions is asked once for each of its arguments. What
-    /// a row lists twice is added up.
+    /// The model of a process, each of whose functions is asked once for each of its arguments.
+    /// What a row lists twice is added up.
     ///
     /// # Errors
     /// [`ProcessError`], naming the row.
