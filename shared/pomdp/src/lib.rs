@@ -17,6 +17,7 @@ pub mod policy_file;
 pub mod policy_graph;
 #[cfg(feature = "pomdpx")]
 mod pomdpx;
+pub mod process;
 mod reader;
 #[cfg(feature = "solver")]
 pub mod solver;
@@ -30,8 +31,9 @@ pub use alpha_vectors::AlphaVectors;
 pub use belief::{Evidence, Tracker};
 pub use bounds::mdp;
 pub use budget::Budget;
-pub use model::{Pomdp, Process, Warning};
+pub use model::{Pomdp, Warning};
 pub use parse_error::{ParseError, Position};
 pub use policy::{
     ActionVoting, Choice, Control, Decider, MostLikelyState, PointBased, Policy, QMdp,
 };
+pub use process::{Process, ProcessError};

@@ -3,7 +3,6 @@
 mod build;
 mod hash;
 mod joint;
-mod process;
 pub(crate) mod rewards;
 pub(crate) mod sparse;
 
@@ -11,7 +10,6 @@ pub use build::Probabilities;
 #[cfg(feature = "solver")]
 pub(crate) use build::ROW_SUM_WARNING;
 pub(crate) use build::{Parts, ROW_SUM_TOLERANCE, refuse_sum};
-pub use process::{Process, ProcessError};
 
 use crate::parse_error::Position;
 use joint::Joint;

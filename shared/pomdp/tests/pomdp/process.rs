@@ -1,7 +1,6 @@
 //! Models in code are the models of their files.
 
-use vigil_pomdp::model::ProcessError;
-use vigil_pomdp::{Pomdp, Process};
+use vigil_pomdp::{Pomdp, Process, ProcessError};
 
 use crate::public::TIGER;
 

@@ -2,10 +2,9 @@
 
 use std::collections::HashSet;
 
-use super::build::{Parts, ROW_SUM_TOLERANCE};
-use super::rewards::{Block, BlockSize, Rewards};
-use super::sparse::Sparse;
-use crate::model::Pomdp;
+use crate::model::rewards::{Block, BlockSize, Rewards};
+use crate::model::sparse::Sparse;
+use crate::model::{Parts, Pomdp, ROW_SUM_TOLERANCE};
 use crate::parse_error::Position;
 use crate::reader::is_reserved;
 
@@ -51,7 +50,7 @@ use crate::reader::is_reserved;
 ///
 /// let model = Pomdp::from_process(&Lamp)?;
 /// assert_eq!(model.successors(0, 0), [(0, 0.9), (1, 0.1)]);
-/// # Ok::<(), vigil_pomdp::model::ProcessError>(())
+/// # Ok::<(), vigil_pomdp::ProcessError>(())
 /// ```
 pub trait Process {
     /// Weight of the next step against this one, 0 to 1.
@@ -156,13 +155,7 @@ impl Pomdp {
                     columns[z * n + s] = p;
                 }
                 let reward = process.reward(s, a);
-                if !reward.is_finite() {
-                    return Err(ProcessError::Reward {
-                        state: state.clone(),
-                        action: action.clone(),
-                        reward,
-                    });
-                }
+                finite(reward, state, action)?;
                 blocks.push(Block::new(size, reward, Vec::new()));
             }
             transitions.push(rows);
@@ -190,6 +183,15 @@ impl Pomdp {
             problem: error.message,
         })
     }
+}
+
+fn finite(reward: f64, state: &str, action: &str) -> Result<(), ProcessError> {
+    let refused = || ProcessError::Reward {
+        state: state.to_owned(),
+        action: action.to_owned(),
+        reward,
+    };
+    reward.is_finite().then_some(()).ok_or_else(refused)
 }
 
 fn names(
