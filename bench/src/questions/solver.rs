@@ -11,10 +11,9 @@ use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::root;
 use vigil_cycle::clock::process_cpu_s;
-use vigil_missions::simulation::{Episode, PolicyAgent, Rules, Summary, horizon, run as drive};
-use vigil_pomdp::policy::{Dual, PolicyKind};
+use vigil_missions::simulation::{Episode, PolicyAgent, Rules, Summary, run as drive};
 use vigil_pomdp::solver::{Options, compact, solve};
-use vigil_pomdp::{AlphaVectors, Budget, PointBased, Pomdp, mdp};
+use vigil_pomdp::{AlphaVectors, Budget, Decider, PointBased, Pomdp, mdp};
 
 /// Gap that APPL left after 20 s, or where it ended; measured on another machine. On
 /// `bridge-repair` it fails.
@@ -199,13 +198,9 @@ fn earned(
 ) -> Result<(f64, f64), Box<dyn Error>> {
     let policy = PointBased::new(model, vectors)?;
     let solution = mdp::solve(model)?;
-    let no_dual = |information| Dual::new(information, 1.0);
-    let decider = PolicyKind::PointBased.build(model, &solution, no_dual, Some(&policy))?;
+    let decider = Decider::new(Box::new(policy), model, &solution);
     let mut agent = PolicyAgent::new(model, decider);
-    let rules = Rules {
-        steps_max: horizon(model.discount(), STEPS_MAX),
-        is_end: vec![false; model.actions().len()],
-    };
+    let rules = Rules::endless(model, STEPS_MAX);
     let left = model.discount().powf(rules.steps_max as f64);
     let mut earned: Vec<f64> = (0..args.episodes)
         .map(|number| {

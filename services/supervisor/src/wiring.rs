@@ -168,8 +168,10 @@ impl Stage for SupervisorStage {
             action: action.action,
             wheel: action.wheel,
             p: action.belief[..states].iter().copied().fold(0.0, f64::max),
-            // A stop by rule was weighed from nothing.
-            weighing: match action.control_mode == ControlMode::Safe as u32 {
+            // Only a new decision is told; a stop by rule was weighed from nothing.
+            weighing: match action.decision_seq == self.decision_reported
+                || action.control_mode == ControlMode::Safe as u32
+            {
                 true => None,
                 false => Weighing::new(action),
             },

@@ -117,13 +117,8 @@ impl FaultDecision {
     fn take_diagnosis(&mut self, diagnosis: &FaultBelief, alarm: bool) {
         self.begin_run(diagnosis.run_id);
         let t_capture_ns = diagnosis.header.t_capture_ns;
-        let timed = self.epoch_clock.is_over(t_capture_ns);
+        let timed = self.pass_time(t_capture_ns);
         let process = &mut self.process;
-        // A call is one step of the model, however long it takes: it ends with a reset.
-        if timed && self.latch.action().is_none() {
-            let action = process.choice.action;
-            process.tracker.predict(&process.model, action);
-        }
         let before = process.tracker.belief();
         let weights = &mut process.scratch;
         write_weights(diagnosis, &self.states, alarm, before, weights);
@@ -131,8 +126,11 @@ impl FaultDecision {
         if timed {
             process.log_evidence = log_score(before, weights);
         }
-        let has_moved = distance(before, weights) > MOVED || self.wheels_have_moved(diagnosis);
-        if !(timed || has_moved || self.process.control_mode != ControlMode::Policy) {
+        let is_due = timed
+            || process.control_mode != ControlMode::Policy
+            || distance(before, weights) > MOVED
+            || self.wheels_have_moved(diagnosis);
+        if !is_due {
             return;
         }
         let process = &mut self.process;
@@ -140,6 +138,19 @@ impl FaultDecision {
         process.tracker.anchor(&process.scratch);
         self.p = diagnosis.p;
         self.decide(t_capture_ns);
+    }
+
+    /// Predicts the belief at the end of an epoch; true if it has ended. A call is one step of the
+    /// model, however long it takes: it ends with a reset.
+    fn pass_time(&mut self, t_capture_ns: u64) -> bool {
+        let is_over = self.epoch_clock.is_over(t_capture_ns);
+        if is_over && self.latch.action().is_none() {
+            let process = &mut self.process;
+            process
+                .tracker
+                .predict(&process.model, process.choice.action);
+        }
+        is_over
     }
 
     fn begin_run(&mut self, run_id: u64) {
@@ -164,11 +175,8 @@ impl FaultDecision {
     fn fall_back(&mut self, detection: &DetectionBelief, alarm: bool) {
         self.begin_run(detection.run_id);
         let t_capture_ns = detection.header.t_capture_ns;
+        self.pass_time(t_capture_ns);
         let process = &mut self.process;
-        if self.epoch_clock.is_over(t_capture_ns) && self.latch.action().is_none() {
-            let action = process.choice.action;
-            process.tracker.predict(&process.model, action);
-        }
         let p_fault = match alarm {
             true => detection.p_fault.clamp(0.0, 1.0),
             false => 0.0,

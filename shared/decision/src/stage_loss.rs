@@ -45,7 +45,7 @@ impl StageLossMonitor {
         self.misses_without_detection >= self.blind_after_misses
     }
 
-    /// A diagnosis has come that makes up for a missing detection; true if the identifier was lost.
+    /// A diagnosis has come that makes up for a missing detection.
     pub(crate) const fn diagnosis(&mut self) {
         self.misses_without_detection = 0;
         self.diagnosis_alone();

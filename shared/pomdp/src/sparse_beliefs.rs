@@ -64,6 +64,17 @@ impl SparseBeliefs {
     }
 }
 
+/// The entries of a dense belief.
+pub(crate) fn sparse(belief: &[f64]) -> Vec<(u32, f64)> {
+    let entries = belief.iter().enumerate().filter(|(_, b)| **b > 0.0);
+    entries.map(|(s, b)| (s as u32, *b)).collect()
+}
+
+/// What the values of all states are worth at a belief.
+pub(crate) fn dot(values: &[f64], belief: &[(u32, f64)]) -> f64 {
+    belief.iter().map(|(s, b)| b * values[*s as usize]).sum()
+}
+
 const fn key(p: f64) -> u64 {
     (p.to_bits() + (1 << (BITS_DROPPED - 1))) >> BITS_DROPPED
 }

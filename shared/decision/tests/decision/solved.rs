@@ -124,7 +124,7 @@ fn faults_are_met_by_a_solved_policy_without_allocating() {
         RecoveryKind::Compensate
     );
     let (_, mut fresh) = supervisor("rover.toml", "rover.pomdp");
-    // What no model explains: first the best of what is not a call for help, then the call.
+    // What no model explains, and may yet be nothing: caution first, then the call.
     let kind = kind_after(&mut fresh, 0.0, 0.99, 1);
     assert!(
         matches!(kind, RecoveryKind::Stop | RecoveryKind::SlowDown),

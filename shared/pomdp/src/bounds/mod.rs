@@ -34,7 +34,7 @@ fn rounding(terms: usize) -> f64 {
 ///
 /// # Errors
 /// [`SolveError::Unbounded`] if that is no less than 1, or no number.
-fn contraction(discount: f64, mass_max: f64) -> Result<f64, SolveError> {
+pub(crate) fn contraction(discount: f64, mass_max: f64) -> Result<f64, SolveError> {
     let factor = discount * mass_max;
     if factor < 1.0 {
         Ok(factor)

@@ -4,7 +4,7 @@ use super::informed::{ENTRIES_MAX, Mixtures};
 use super::{ActionValues, SolveError, fib};
 use crate::budget::Budget;
 use crate::model::Pomdp;
-use crate::sparse_beliefs::{BeliefId, SparseBeliefs};
+use crate::sparse_beliefs::{BeliefId, SparseBeliefs, dot, sparse};
 
 /// Q over the beliefs one step from the corners, ready to value any belief.
 #[derive(Debug, Clone)]
@@ -22,13 +22,13 @@ impl Tib {
     /// Q(b,a) = R(b,a) + gamma sum_o max_a' sum_s b(s) p(o|s,a) Q(b_sao,a').
     #[must_use]
     pub fn q(&self, belief: &[f64], action: usize) -> f64 {
-        self.q_sparse(&support(belief), action)
+        self.q_sparse(&sparse(belief), action)
     }
 
     /// max_a Q(b,a): an upper bound of V*(b).
     #[must_use]
     pub fn value(&self, belief: &[f64]) -> f64 {
-        self.value_sparse(&support(belief))
+        self.value_sparse(&sparse(belief))
     }
 
     pub(crate) fn value_sparse(&self, belief: &[(u32, f64)]) -> f64 {
@@ -39,25 +39,20 @@ impl Tib {
 
     pub(crate) fn q_sparse(&self, belief: &[(u32, f64)], action: usize) -> f64 {
         let n = self.states;
-        let dot = |row: &[f64]| -> f64 { belief.iter().map(|(s, b)| b * row[*s as usize]).sum() };
+        let worth = |row: &[f64]| dot(row, belief);
         let block = self.observations * self.actions * n;
         let table = &self.table[action * block..][..block];
         let next: f64 = table
             .chunks(self.actions * n)
-            .map(|of_o| of_o.chunks(n).map(dot).fold(f64::NEG_INFINITY, f64::max))
+            .map(|of_o| of_o.chunks(n).map(worth).fold(f64::NEG_INFINITY, f64::max))
             .sum();
-        dot(&self.rewards[action * n..][..n]) + next
+        worth(&self.rewards[action * n..][..n]) + next
     }
 
     /// Work of one [`Self::q_sparse`] per entry of the belief.
     pub(crate) const fn work(&self) -> usize {
         self.observations * self.actions
     }
-}
-
-fn support(belief: &[f64]) -> Vec<(u32, f64)> {
-    let entries = belief.iter().enumerate().filter(|(_, b)| **b > 0.0);
-    entries.map(|(s, b)| (s as u32, *b)).collect()
 }
 
 /// Where every (s, a, o) leads.
@@ -183,11 +178,7 @@ pub fn solve_from(
     let ids = 0..steps.beliefs.len() as BeliefId;
     let guess = ids
         .flat_map(|id| (0..actions).map(move |a| (id, a)))
-        .map(|(id, a)| {
-            let q = fast.values(a);
-            let terms = steps.beliefs.entries(id).iter();
-            terms.map(|(s, b)| b * q[*s as usize]).sum()
-        })
+        .map(|(id, a)| dot(fast.values(a), steps.beliefs.entries(id)))
         .collect();
     let q = mixtures.solve(guess, model.discount(), budget)?;
     let mut table = Vec::with_capacity(n * actions * actions * steps.observations);

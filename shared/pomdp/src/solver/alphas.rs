@@ -4,7 +4,7 @@
 //! they are a controller, whose value the vectors never exceed.
 
 use crate::bounds::ActionValues;
-use crate::sparse_beliefs::BeliefId;
+use crate::sparse_beliefs::{BeliefId, dot};
 
 /// Index of a vector.
 pub(super) type AlphaId = u32;
@@ -78,8 +78,7 @@ impl Alphas {
     }
 
     pub(super) fn value(&self, id: AlphaId, belief: &[(u32, f64)]) -> f64 {
-        let alpha = self.values(id);
-        belief.iter().map(|(s, b)| b * alpha[*s as usize]).sum()
+        dot(self.values(id), belief)
     }
 
     pub(super) fn push(

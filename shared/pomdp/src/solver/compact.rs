@@ -19,7 +19,7 @@ use crate::alpha_vectors::{AlphaVectors, VectorError};
 use crate::bounds::SolveError;
 use crate::budget::{Budget, StopRequest};
 use crate::model::Pomdp;
-use crate::sparse_beliefs::SparseBeliefs;
+use crate::sparse_beliefs::{SparseBeliefs, dot, sparse};
 
 /// Beliefs at which vectors are compared, at most. Chosen by hand, as are the next two: together
 /// they bound the time that choosing takes to some seconds.
@@ -238,10 +238,10 @@ impl<'m> Choice<'m> {
                 if loss > ROUNDING * self.scale && beliefs.len() < self.beliefs_max() {
                     beliefs.push(belief.clone());
                 }
-                let next = self.draw(&belief, self.plans[plan].0, random.random(), budget)?;
+                let action = self.plans[plan].0;
+                let next = self.draw(&belief, action, random.random(), budget)?;
                 discount *= self.model.discount();
                 steps += 1;
-                let action = self.plans[plan].0;
                 if next == belief && self.stays(&belief, action, budget)? {
                     // For ever.
                     sum += discount * loss / (1.0 - self.model.discount());
@@ -302,15 +302,6 @@ impl<'m> Choice<'m> {
         budget.spend(work + self.plans.len() * belief.len())?;
         Ok(next)
     }
-}
-
-fn sparse(belief: &[f64]) -> SparseBelief {
-    let some = belief.iter().enumerate().filter(|(_, b)| **b > 0.0);
-    some.map(|(s, b)| (s as u32, *b)).collect()
-}
-
-fn dot(alpha: &[f64], belief: &[(u32, f64)]) -> f64 {
-    belief.iter().map(|(s, b)| b * alpha[*s as usize]).sum()
 }
 
 /// Index of the largest number, the first of equal ones, and the number.

@@ -11,10 +11,10 @@ use std::collections::HashMap;
 use super::alphas::AlphaId;
 use super::occupancy::Plan;
 use super::tree::Tree;
-use crate::bounds::SolveError;
 use crate::bounds::linear::{Rows, System};
+use crate::bounds::{SolveError, contraction};
 use crate::budget::{Budget, StopRequest};
-use crate::sparse_beliefs::BeliefId;
+use crate::sparse_beliefs::{BeliefId, dot};
 
 /// Largest number of matrix entries. Chosen by hand: solving more takes longer than it narrows.
 const ENTRIES_MAX: usize = 400_000;
@@ -71,7 +71,7 @@ impl Tree<'_> {
         let is_better = |tree: &Self, part: usize| {
             let belief = tree.beliefs.entries(controller.parts[part]);
             let alpha = &values[part * states..][..states];
-            let value: f64 = belief.iter().map(|(s, b)| b * alpha[*s as usize]).sum();
+            let value = dot(alpha, belief);
             let before = tree.nodes[controller.parts[part] as usize].lower;
             value > before + worthwhile.max(1e-9 * before.abs().max(1e-3))
         };
@@ -104,8 +104,7 @@ impl Tree<'_> {
         root: BeliefId,
         budget: &mut Budget<'_>,
     ) -> Result<(), StopRequest> {
-        let mut visited = self.visited(root, Plan::Held, budget)?;
-        visited.sort_by(|a, b| b.visits.total_cmp(&a.visits).then(a.id.cmp(&b.id)));
+        let mut visited = self.most_visited(root, Plan::Held, budget)?;
         visited.truncate(IMPROVED_MAX);
         let is_thorough = std::mem::replace(&mut self.is_thorough, true);
         for at in visited {
@@ -125,8 +124,7 @@ impl Tree<'_> {
     ) -> Result<Controller, StopRequest> {
         let states = self.model.states().len();
         let observations = self.model.observations().len();
-        let mut visited = self.visited(root, plan, budget)?;
-        visited.sort_by(|a, b| b.visits.total_cmp(&a.visits).then(a.id.cmp(&b.id)));
+        let visited = self.most_visited(root, plan, budget)?;
         let mut place = HashMap::new();
         let mut parts = Vec::new();
         let mut entries = 0;
@@ -154,8 +152,8 @@ impl Tree<'_> {
         let mut next = Vec::new();
         for (id, action) in &parts {
             // What cannot be observed here goes on as what is most probable.
-            let (mut probable, mut go_on) = ((0.0, Next::Vector(0)), Vec::new());
-            go_on.resize(self.model.observations().len(), None);
+            let mut probable = (0.0, Next::Vector(0));
+            let mut go_on = vec![None; self.model.observations().len()];
             for child in self.children_of(*id, *action, budget)? {
                 let child = self.children[child];
                 let follows = match (place.get(&child.node), edge) {
@@ -254,9 +252,8 @@ impl Tree<'_> {
             .residual(&values)
             .into_iter()
             .fold(0.0_f64, |m, r| m.max(-r));
-        let contraction = 1.0 - model.discount() * mass_max;
-        let error = short / contraction;
-        if !error.is_finite() || contraction <= 0.0 {
+        let error = short / (1.0 - contraction(model.discount(), mass_max)?);
+        if !error.is_finite() {
             return Err(SolveError::Unbounded(model.discount()));
         }
         values.iter_mut().for_each(|v| *v -= error);

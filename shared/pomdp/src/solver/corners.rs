@@ -50,9 +50,19 @@ impl Tree<'_> {
         self.walk(corner, TARGET_SHARE * gap, budget)?;
         let upper = self.upper(corner, budget)?;
         if upper < self.sawtooth.corners()[state] - LOWERED_SHARE * gap {
-            self.sawtooth.lower_corner(&self.beliefs, state, upper);
-            budget.spend(10 * self.sawtooth.point_count())?;
+            self.lower_corner(state, upper, budget)?;
         }
         Ok(())
+    }
+
+    /// Lowers the upper bound where the state is certain, and so the planes between.
+    pub(super) fn lower_corner(
+        &mut self,
+        state: usize,
+        upper: f64,
+        budget: &mut Budget<'_>,
+    ) -> Result<(), StopRequest> {
+        self.sawtooth.lower_corner(&self.beliefs, state, upper);
+        budget.spend(10 * self.sawtooth.point_count())
     }
 }

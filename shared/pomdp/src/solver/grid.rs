@@ -8,8 +8,8 @@
 use std::collections::HashMap;
 
 use super::tree::Tree;
-use crate::bounds::SolveError;
 use crate::bounds::linear::{Rows, System};
+use crate::bounds::{SolveError, contraction};
 use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
@@ -146,8 +146,7 @@ impl Tree<'_> {
             let upper = self.nodes[corner as usize].upper;
             let before = self.sawtooth.corners()[state];
             if upper < before - 1e-9 * before.abs() {
-                self.sawtooth.lower_corner(&self.beliefs, state, upper);
-                budget.spend(10 * self.sawtooth.point_count())?;
+                self.lower_corner(state, upper, budget)?;
             }
         }
         Ok(())
@@ -298,9 +297,8 @@ impl Tree<'_> {
         let excess = (0..values.len())
             .map(|belief| choices.best(belief, discount, &values).1 - values[belief])
             .fold(0.0, f64::max);
-        let contraction = 1.0 - discount * choices.mass_max;
-        let error = excess / contraction;
-        if !error.is_finite() || contraction <= 0.0 {
+        let error = excess / (1.0 - contraction(discount, choices.mass_max)?);
+        if !error.is_finite() {
             return Err(SolveError::Unbounded(discount));
         }
         values.iter_mut().for_each(|v| *v += error);

@@ -117,6 +117,18 @@ impl Tree<'_> {
         }
     }
 
+    /// The same, those that are visited most first.
+    pub(super) fn most_visited(
+        &mut self,
+        root: BeliefId,
+        plan: Plan,
+        budget: &mut Budget<'_>,
+    ) -> Result<Vec<Visited>, StopRequest> {
+        let mut visited = self.visited(root, plan, budget)?;
+        visited.sort_by(|a, b| b.visits.total_cmp(&a.visits).then(a.id.cmp(&b.id)));
+        Ok(visited)
+    }
+
     /// x = e_root + gamma P^T x.
     fn visits(
         &mut self,

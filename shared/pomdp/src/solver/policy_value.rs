@@ -10,11 +10,11 @@ use std::collections::BinaryHeap;
 
 use super::followers::Followers;
 use crate::bounds::linear::{Rows, System};
-use crate::bounds::{SolveError, mdp};
+use crate::bounds::{SolveError, contraction, mdp};
 use crate::budget::Budget;
 use crate::model::Pomdp;
 use crate::policy::Policy;
-use crate::sparse_beliefs::{BeliefId, SparseBeliefs};
+use crate::sparse_beliefs::{BeliefId, SparseBeliefs, dot, sparse};
 
 /// The value of a policy at the start belief lies between these.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,22 +55,15 @@ pub fn policy_value(
     let bounds = [vec![least; states.len()], most.collect()];
     let walk = Walk::new(model, policy, beliefs_max, budget)?;
     let chain = Chain::new(discount, walk, &bounds);
-    let [lower, upper] = chain.beyond_worth.each_ref().map(|worth| {
-        let right = chain.rewards.iter().zip(worth);
-        let right: Vec<f64> = right.map(|(reward, beyond)| reward + beyond).collect();
-        right
-    });
-    let (lower, upper) = (
-        chain.solve(&lower, budget)?.0,
-        chain.solve(&upper, budget)?.1,
-    );
+    let [lower, upper] = &chain.earned;
+    let (lower, upper) = (chain.solve(lower, budget)?.0, chain.solve(upper, budget)?.1);
     let rest = discount / (1.0 - discount);
     let right: Vec<f64> = chain.beyond.iter().map(|p| p * rest).collect();
     let beyond = chain.solve(&right, budget)?.1 * (1.0 - discount);
     Ok(PolicyValue {
         lower,
         upper,
-        beliefs: chain.rewards.len(),
+        beliefs: chain.beyond.len(),
         beyond: beyond.clamp(0.0, 1.0),
     })
 }
@@ -78,12 +71,12 @@ pub fn policy_value(
 /// The beliefs that were gone through, in order.
 struct Chain {
     discount: f64,
-    rewards: Vec<f64>,
     links: Rows,
-    /// Probability with which a step leads beyond, and what is earned there, at least and at most,
-    /// discounted.
+    /// What a step earns, and what is earned where it leads beyond, discounted: at least and at
+    /// most.
+    earned: [Vec<f64>; 2],
+    /// Probability with which a step leads beyond.
     beyond: Vec<f64>,
-    beyond_worth: [Vec<f64>; 2],
     /// Largest probability with which one does not.
     mass_max: f64,
 }
@@ -109,9 +102,7 @@ impl Walk {
     ) -> Result<Self, SolveError> {
         let mut walk = Self::default();
         let mut followers = Followers::default();
-        let start = model.start().iter().enumerate().filter(|(_, b)| **b > 0.0);
-        let start: Vec<(u32, f64)> = start.map(|(s, b)| (s as u32, *b)).collect();
-        let root = walk.store.intern(&start);
+        let root = walk.store.intern(&sparse(model.start()));
         walk.place.push(None);
         let mut values = vec![0.0; model.actions().len()];
         let mut dense = vec![0.0; model.states().len()];
@@ -157,10 +148,9 @@ impl Chain {
     fn new(discount: f64, walk: Walk, bounds: &[Vec<f64>; 2]) -> Self {
         let mut chain = Self {
             discount,
-            rewards: Vec::new(),
             links: Rows::default(),
+            earned: [Vec::new(), Vec::new()],
             beyond: Vec::new(),
-            beyond_worth: [Vec::new(), Vec::new()],
             mass_max: 0.0,
         };
         for (reward, next) in walk.steps {
@@ -173,16 +163,13 @@ impl Chain {
                 }
                 beyond += p;
                 for (worth, bound) in worth.iter_mut().zip(bounds) {
-                    let entries = walk.store.entries(id).iter();
-                    let value: f64 = entries.map(|(s, b)| b * bound[*s as usize]).sum();
-                    *worth += discount * p * value;
+                    *worth += discount * p * dot(bound, walk.store.entries(id));
                 }
             }
             chain.links.end_row();
-            chain.rewards.push(reward);
             chain.beyond.push(beyond);
-            for (all, worth) in chain.beyond_worth.iter_mut().zip(worth) {
-                all.push(worth);
+            for (earned, worth) in chain.earned.iter_mut().zip(worth) {
+                earned.push(reward + worth);
             }
             chain.mass_max = chain.mass_max.max(mass);
         }
@@ -200,9 +187,8 @@ impl Chain {
         let x = system.solve_roughly(vec![0.0; right.len()], budget)?;
         let left = system.residual(&x).into_iter();
         let error = left.fold(0.0_f64, |most, r| most.max(r.abs()));
-        let contraction = 1.0 - self.discount * self.mass_max;
-        let error = error / contraction;
-        if !error.is_finite() || contraction <= 0.0 {
+        let error = error / (1.0 - contraction(self.discount, self.mass_max)?);
+        if !error.is_finite() {
             return Err(SolveError::Unbounded(self.discount));
         }
         let first = x.first().copied().unwrap_or(0.0);

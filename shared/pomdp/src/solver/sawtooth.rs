@@ -5,7 +5,7 @@
 //! the plane through the corners; here it is the lower of that and the fast informed bound.
 
 use crate::bounds::ActionValues;
-use crate::sparse_beliefs::{BeliefId, SparseBeliefs};
+use crate::sparse_beliefs::{BeliefId, SparseBeliefs, dot};
 
 /// A belief whose upper bound was improved.
 #[derive(Debug, Clone, Copy)]
@@ -79,9 +79,9 @@ impl Sawtooth {
 
     /// The lower of the fast informed bound and the plane through the corners.
     pub(super) fn base_value(&self, belief: &[(u32, f64)]) -> f64 {
-        let dot = |q: &[f64]| -> f64 { belief.iter().map(|(s, b)| b * q[*s as usize]).sum() };
-        let fast = self.base.rows().map(dot).fold(f64::NEG_INFINITY, f64::max);
-        fast.min(dot(&self.corners))
+        let fast = self.base.rows().map(|q| dot(q, belief));
+        let fast = fast.fold(f64::NEG_INFINITY, f64::max);
+        fast.min(dot(&self.corners, belief))
     }
 
     /// Lowers the upper bound where a state is certain. Every point gives less elsewhere, so that
@@ -90,9 +90,7 @@ impl Sawtooth {
         self.corners[state] = value;
         self.stamp += 1;
         for point in &mut self.points {
-            let entries = beliefs.entries(point.belief).iter();
-            let plane = entries.map(|(s, b)| b * self.corners[*s as usize]);
-            point.plane = plane.sum();
+            point.plane = dot(&self.corners, beliefs.entries(point.belief));
             point.stamp = self.stamp;
         }
     }
@@ -116,20 +114,18 @@ impl Sawtooth {
                     self.masks[first + *s as usize / 64] |= 1 << (s % 64);
                 }
                 for q in self.base.rows() {
-                    let terms = entries.iter();
-                    self.based
-                        .push(terms.map(|(s, b)| b * q[*s as usize]).sum());
+                    self.based.push(dot(q, entries));
                 }
                 self.slots += 1;
                 self.slots - 1
             }
         };
-        let plane = entries.iter().map(|(s, b)| b * self.corners[*s as usize]);
+        let plane = dot(&self.corners, entries);
         self.points.push(Point {
             stamp: self.stamp,
             belief,
             value,
-            plane: plane.sum(),
+            plane,
             slot,
         });
     }
@@ -138,14 +134,11 @@ impl Sawtooth {
     pub(super) fn value(&mut self, beliefs: &SparseBeliefs, query: &Query<'_>) -> (f64, usize) {
         let actions = self.base.rows().len();
         self.enter(query.entries);
-        let dot = |q: &[f64]| -> f64 {
-            let terms = query.entries.iter();
-            terms.map(|(s, b)| b * q[*s as usize]).sum()
-        };
-        let at: Vec<f64> = self.base.rows().map(dot).collect();
+        let at = self.base.rows().map(|q| dot(q, query.entries));
+        let at: Vec<f64> = at.collect();
         let fast = at.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let strongest = at.iter().position(|v| *v == fast).unwrap_or(0);
-        let plane = dot(&self.corners);
+        let plane = dot(&self.corners, query.entries);
         let (mut best, mut work) = (query.value.min(fast).min(plane), at.len());
         let newer = self.points.iter().rev();
         for point in newer.take_while(|point| point.stamp > query.seen) {

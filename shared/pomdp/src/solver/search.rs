@@ -6,7 +6,7 @@ use super::occupancy::Plan;
 use super::report::{Bracket, EndReason, Options, Progress};
 use super::tree::Tree;
 use crate::budget::{Budget, StopRequest};
-use crate::sparse_beliefs::BeliefId;
+use crate::sparse_beliefs::{BeliefId, sparse};
 
 /// A walk aims at this share of the gap at the start belief.
 const TARGET_SHARE: f64 = 0.5;
@@ -82,12 +82,7 @@ impl<'m> Search<'m> {
         rounding: f64,
         budget: &mut Budget<'_>,
     ) -> Result<Self, StopRequest> {
-        let start = tree.model.start().iter().enumerate();
-        let start: Vec<(u32, f64)> = start
-            .filter(|(_, b)| **b > 0.0)
-            .map(|(s, b)| (s as u32, *b))
-            .collect();
-        let root = tree.node(&start, budget)?;
+        let root = tree.node(&sparse(tree.model.start()), budget)?;
         let mut search = Self {
             tree,
             root,

@@ -18,6 +18,17 @@ pub struct Rules {
     pub is_end: Vec<bool>,
 }
 
+impl Rules {
+    /// No action ends it: it goes on until the discount is below 1e-4, or for `cap` steps.
+    #[must_use]
+    pub fn endless(model: &Pomdp, cap: usize) -> Self {
+        Self {
+            steps_max: horizon(model.discount(), cap),
+            is_end: vec![false; model.actions().len()],
+        }
+    }
+}
+
 /// What a mission brought.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Mission {

@@ -3,7 +3,7 @@
 
 use vigil_missions::learning::{Record, Settings, check, learn};
 use vigil_missions::navigation::{self, Parameters, QUIET};
-use vigil_missions::simulation::{Agent, Episode, Escalation, PolicyAgent, Rules, horizon, run};
+use vigil_missions::simulation::{Agent, Episode, Escalation, PolicyAgent, Rules, run};
 use vigil_pomdp::policy::{Base, Decider};
 use vigil_pomdp::{Pomdp, mdp};
 
@@ -18,10 +18,7 @@ fn mean(world: &Pomdp, agent: &mut dyn Agent, missions: u64) -> f64 {
 }
 
 fn rules(model: &Pomdp) -> Rules {
-    Rules {
-        steps_max: horizon(model.discount(), 2000),
-        is_end: vec![false; model.actions().len()],
-    }
+    Rules::endless(model, 2000)
 }
 
 fn agent(model: &Pomdp) -> PolicyAgent<'_> {

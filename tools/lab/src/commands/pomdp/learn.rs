@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use vigil_missions::learning::check::{Agreement, Refusal, RewardCheck};
 use vigil_missions::learning::{LearnedModel, Record, Settings, check, learn};
 use vigil_missions::simulation::{
-    Episode, PairedDifference, PolicyAgent, Rules, Summary, horizon, run as fly,
+    Episode, PairedDifference, PolicyAgent, Rules, Summary, run as fly,
 };
 use vigil_pomdp::policy::{Dual, PolicyName};
 use vigil_pomdp::{Pomdp, mdp};
@@ -200,10 +200,7 @@ fn worth(args: &Args, model: &Pomdp, world: &Pomdp) -> Result<Vec<f64>, CommandE
     }
     let decider = name.build(model, &solution, |information| Dual::new(information, 1.0));
     let mut agent = PolicyAgent::new(model, decider.map_err(CommandError::usage)?);
-    let rules = Rules {
-        steps_max: horizon(world.discount(), 2000),
-        is_end: vec![false; world.actions().len()],
-    };
+    let rules = Rules::endless(world, 2000);
     let seed = seed::for_command("learn", args.seed);
     let one = |number| fly(world, &mut agent, &rules, Episode { seed, number }).discounted;
     Ok((0..args.episodes).map(one).collect())

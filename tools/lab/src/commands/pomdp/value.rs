@@ -4,10 +4,9 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 use vigil_cycle::signal;
-use vigil_missions::simulation::{Episode, PolicyAgent, Rules, Summary, horizon, run as drive};
-use vigil_pomdp::policy::{Dual, PolicyKind};
+use vigil_missions::simulation::{Episode, PolicyAgent, Rules, Summary, run as drive};
 use vigil_pomdp::solver::{PolicyValue, policy_value};
-use vigil_pomdp::{Budget, PointBased, Pomdp, mdp};
+use vigil_pomdp::{Budget, Decider, PointBased, Pomdp, mdp};
 use vigil_terminal::output::Progress;
 use vigil_terminal::{CommandError, Outcome};
 
@@ -76,9 +75,9 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let mut budget = Budget::new(&mut stop);
     let certain = policy_value(&model, &mut policy, args.beliefs_max as usize, &mut budget)
         .map_err(|error| CommandError::failure(format!("{}: {error}", args.file.display())))?;
-    let steps_max = horizon(model.discount(), STEPS_MAX);
-    let sampled = sample(args, &model, &policy, steps_max)?;
-    let document = document(args, &model, &certain, sampled, steps_max);
+    let rules = Rules::endless(&model, STEPS_MAX);
+    let sampled = sample(args, &model, policy, &rules)?;
+    let document = document(args, &model, &certain, sampled, rules.steps_max);
     print(args.json, &document, || summary(&document))?;
     Ok(Outcome::Done)
 }
@@ -86,24 +85,17 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 fn sample(
     args: &Args,
     model: &Pomdp,
-    policy: &PointBased,
-    steps_max: usize,
+    policy: PointBased,
+    rules: &Rules,
 ) -> Result<(Summary, u64), CommandError> {
     let solution = mdp::solve(model).map_err(CommandError::usage)?;
-    let no_dual = |information| Dual::new(information, 1.0);
-    let decider = PolicyKind::PointBased
-        .build(model, &solution, no_dual, Some(policy))
-        .map_err(CommandError::usage)?;
+    let decider = Decider::new(Box::new(policy), model, &solution);
     let mut agent = PolicyAgent::new(model, decider);
-    let rules = Rules {
-        steps_max,
-        is_end: vec![false; model.actions().len()],
-    };
     let seed = seed::for_command("value", args.seed);
     let progress = Progress::new("missions", args.episodes as usize);
     let earned = |number: u64| {
         progress.show(number as usize);
-        drive(model, &mut agent, &rules, Episode { seed, number }).discounted
+        drive(model, &mut agent, rules, Episode { seed, number }).discounted
     };
     // Ctrl-C ends it after the mission that runs; an interval needs two.
     let goes_on = |number: &u64| *number < 2 || !signal::stop_requested();
