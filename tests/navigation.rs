@@ -10,8 +10,6 @@ use vigil_blocks::{
 use vigil_decision::{Inputs, Supervisor};
 use vigil_diagnosis::detect::Detector;
 use vigil_diagnosis::identify::{Diagnoser, Input};
-use vigil_pomdp::solver::{Options, solve};
-use vigil_pomdp::{Budget, PointBased};
 use vigil_robot::injection::Injection;
 use vigil_sensor_sim::{NavigatorEvent, SensorSource, Simulation};
 use vigil_setup::graph_file::{GraphFile, Trouble, TroubleKind};
@@ -126,6 +124,9 @@ impl Corridor {
     fn name(kind: RecoveryKind) -> String {
         let names = [
             (RecoveryKind::GoOn, "FP"),
+            (RecoveryKind::SlowDown, "SL"),
+            (RecoveryKind::Compensate, "CP"),
+            (RecoveryKind::IgnoreEncoder, "IG"),
             (RecoveryKind::NewPath, "NP"),
             (RecoveryKind::Relocalise, "RL"),
             (RecoveryKind::GoThrough, "GO"),
@@ -166,29 +167,6 @@ fn people_are_waited_for_and_passed() {
     corridor.drive(40.0);
     let expected = ["FP", "+EPM", "GO", "+EPS", "GO done", "FP", "goal"];
     assert_eq!(corridor.told, expected);
-}
-
-#[test]
-fn a_policy_that_was_solved_beforehand_brings_both_corridors_to_their_goals() {
-    for name in ["corridor-obstacle.toml", "corridor-people.toml"] {
-        let mut setup = setup(name, |_| {});
-        let options = Options {
-            precision: 0.3,
-            ..Options::default()
-        };
-        let mut never = || false;
-        let budget = &mut Budget::new(&mut never);
-        let found = solve(&setup.decision, &options, budget, &mut |_| ()).unwrap();
-        let policy = PointBased::new(&setup.decision, &found.vectors.unwrap()).unwrap();
-        setup.file.supervisor.policy = "point-based".to_owned();
-        setup.policy = Some(policy);
-        let mut corridor = Corridor::new(setup);
-        corridor.drive(60.0);
-        assert_eq!(corridor.told[..3], ["FP", "+EPM", "GO"], "{name}");
-        assert_eq!(corridor.told.last().unwrap(), "goal", "{:?}", corridor.told);
-        let action = corridor.action.unwrap();
-        assert!(action.value.iter().all(|value| value.is_finite()));
-    }
 }
 
 /// The people's corridor without people, and with this trouble.
@@ -237,20 +215,19 @@ fn a_mislocalised_robot_finds_its_place() {
     }
 }
 
-/// Before a wall and without a loop it looks like any robot whose way is blocked: a person knows.
 #[test]
-fn by_symptoms_alone_a_lost_robot_that_does_not_loop_calls_for_help() {
+fn without_a_state_for_it_a_lost_robot_is_taken_for_a_broken_one() {
     let place = [0.3, 0.9, 0.4];
     let mut corridor = troubled(TroubleKind::Mislocalised, 5.0, place);
-    let settings = &mut corridor.setup.file.supervisor;
-    (settings.hardware_state, settings.lost_state) = (None, None);
+    corridor.setup.file.supervisor.lost_state = None;
     corridor.supervisor = vigil_supervisor::assemble(&corridor.setup).unwrap();
     corridor.drive(80.0);
-    let mut expected = vec!["FP", "+EPM", "GO", "+EPS", "+EPM", "+EPS", "GO failed"];
-    expected.extend(["NP", "NP failed"].repeat(3));
-    expected.extend(["GO", "GO failed"].repeat(3));
-    expected.extend(["SH", "SH done", "FP", "goal"]);
-    assert_eq!(corridor.told, expected);
+    let told = &corridor.told;
+    let ends = ["SH done", "FP", "goal"].map(str::to_owned);
+    assert!(
+        told.ends_with(&ends) && !told.contains(&"RL".to_owned()),
+        "{told:?}"
+    );
 }
 
 #[test]
@@ -274,7 +251,7 @@ fn a_tether_that_nobody_has_modelled_stops_the_robot() {
     corridor.simulation.change(change).unwrap();
     corridor.drive(60.0);
     // Held fast while all wheels turn is no lost place: somebody must help.
-    let expected = ["FP", "SH", "SH done", "FP", "goal"];
+    let expected = ["FP", "SL", "SH", "SH done", "FP", "goal"];
     assert_eq!(corridor.told, expected);
 }
 
@@ -294,33 +271,33 @@ fn a_blind_robot_touches_and_is_helped() {
         });
     }));
     corridor.drive(80.0);
-    let mut expected = vec!["FP", "+EPM", "GO", "+EPS", "GO failed"];
-    expected.extend(["NP", "NP failed"].repeat(3));
-    expected.extend(["GO", "GO failed"].repeat(3));
-    expected.extend(["SH", "SH done", "FP", "goal"]);
+    // No way leads round: that is not asked twice.
+    let mut expected = vec!["FP", "+EPM", "GO", "+EPS", "GO failed", "NP", "NP failed"];
+    expected.extend(["GO", "GO failed", "SH", "SH done", "FP", "goal"]);
     assert_eq!(corridor.told, expected);
 }
 
-#[test]
-fn a_stuck_wheel_is_a_hardware_problem_by_the_identifiers_word() {
+/// The people's corridor with this fault from the fifth second on, and without people unless they
+/// are wanted.
+fn broken(fault: &str, people: bool) -> Corridor {
     let mut corridor = Corridor::new(setup("corridor-people.toml", |file| {
-        file.navigation.as_mut().unwrap().obstacle.clear();
+        if !people {
+            file.navigation.as_mut().unwrap().obstacle.clear();
+        }
     }));
     corridor.drive(5.0);
-    let fault = vigil_robot::Fault {
-        kind: vigil_robot::FaultKind::Stuck,
-        wheel: corridor.setup.robot.wheel_index("RM").unwrap(),
-    };
-    corridor.simulation.world.inject(fault).unwrap();
-    corridor.drive(0.5);
-    assert_eq!(corridor.told, ["FP", "SH"]);
-    let hp = corridor
-        .setup
-        .decision
-        .states()
-        .iter()
-        .position(|s| s == "HP");
-    assert!(corridor.action.as_ref().unwrap().belief[hp.unwrap()] > 0.9);
-    corridor.drive(30.0);
-    assert_eq!(corridor.told, ["FP", "SH", "SH done", "FP", "goal"]);
+    let change = Injection::parse_change(fault, &corridor.setup.robot).unwrap();
+    corridor.simulation.change(change).unwrap();
+    corridor.drive(60.0);
+    corridor
+}
+
+#[test]
+fn a_stuck_wheel_is_compensated_on_the_way_and_through_an_opening() {
+    let corridor = broken("stuck:RM", false);
+    assert_eq!(corridor.told, ["FP", "SL", "CP", "goal"]);
+    let corridor = broken("stuck:RM", true);
+    let mut expected = vec!["FP", "SL", "CP", "+EPM", "GO", "+EPS", "GO done"];
+    expected.extend(["CP", "goal"]);
+    assert_eq!(corridor.told, expected);
 }

@@ -247,11 +247,18 @@ fn blind_s<'a>(
     sums
 }
 
+fn own_symptoms(setup: &Setup) -> Vec<(String, u32)> {
+    let own = setup.file.supervisor.symptoms.iter();
+    own.map(|(name, own)| (name.clone(), own.bit)).collect()
+}
+
 /// Gives names to what events are about.
 struct Namer {
     nodes: Vec<String>,
     states: Vec<String>,
     actions: Vec<String>,
+    /// The user's own, with their bits.
+    symptoms: Vec<(String, u32)>,
     robot: vigil_robot::Description,
 }
 
@@ -263,6 +270,7 @@ impl Namer {
             nodes: nodes.map(|node| node.name.clone()).collect(),
             states: setup.decision.states().to_vec(),
             actions: setup.decision.actions().to_vec(),
+            symptoms: own_symptoms(setup),
             robot: setup.robot.clone(),
         }
     }
@@ -356,7 +364,7 @@ impl Namer {
                 None => "?".into(),
             },
             EventKind::Run => event.value.to_string(),
-            EventKind::Symptoms => words::symptoms(event.what),
+            EventKind::Symptoms => words::symptoms(event.what, &self.symptoms),
             EventKind::ContextChanged => {
                 let context = self.robot.context.get(event.what as usize);
                 context.map_or_else(|| "?".into(), |context| context.name.clone())

@@ -3,10 +3,13 @@
 use vigil_blocks::{ActionOutcome, Blindness, Degraded, Event, RecoveryKind, SizeKind, Symptoms};
 use vigil_cycle::watchdog::WatchdogFinding;
 
-/// Symptoms, joined by `_` as in the decision model; `none` for the empty set.
-pub fn symptoms(set: u32) -> String {
-    let present = Symptoms::NAMED.iter().filter(|(_, bit)| set & bit != 0);
-    let present: Vec<&str> = present.map(|(name, _)| *name).collect();
+/// Symptoms, joined by `_` as in the decision model; `none` for the empty set. `own` are those that
+/// the graph declares, with their bits.
+pub fn symptoms(set: u32, own: &[(String, u32)]) -> String {
+    let own = own.iter().map(|(name, bit)| (name.as_str(), 1 << bit));
+    let named = Symptoms::NAMED.into_iter().chain(own);
+    let present = named.filter(|(_, bit)| set & bit != 0);
+    let present: Vec<&str> = present.map(|(name, _)| name).collect();
     if present.is_empty() {
         "none".into()
     } else {
@@ -85,8 +88,10 @@ mod tests {
 
     #[test]
     fn sets_of_symptoms_and_reasons_are_joined_and_empty_ones_have_a_word() {
-        assert_eq!(symptoms(0), "none");
-        assert_eq!(symptoms(Symptoms::EPS | Symptoms::LD), "EPS_LD");
+        let own = [("DOOR".to_owned(), 9)];
+        assert_eq!(symptoms(0, &own), "none");
+        assert_eq!(symptoms(Symptoms::EPS | Symptoms::LD, &own), "EPS_LD");
+        assert_eq!(symptoms(1 << 9 | Symptoms::LD, &own), "LD_DOOR");
         assert_eq!(degraded(0), "no longer");
         let both = Degraded::INPUT_LOST | Degraded::LATE;
         assert_eq!(degraded(both), "input lost, late");

@@ -143,7 +143,8 @@ fn admit(
         | RecoveryKind::CallForHelp
         | RecoveryKind::NewPath
         | RecoveryKind::Relocalise
-        | RecoveryKind::GiveUp => None,
+        | RecoveryKind::GiveUp
+        | RecoveryKind::Own => None,
         RecoveryKind::GoOn
         | RecoveryKind::GoThrough
         | RecoveryKind::MoveAway
@@ -229,8 +230,8 @@ mod tests {
 
     #[test]
     fn what_is_done_standing_stops_without_being_a_safe_stop() {
-        use RecoveryKind::{CallForHelp, GiveUp, NewPath, Relocalise, Stop};
-        for kind in [Stop, CallForHelp, NewPath, Relocalise, GiveUp] {
+        use RecoveryKind::{CallForHelp, GiveUp, NewPath, Own, Relocalise, Stop};
+        for kind in [Stop, CallForHelp, NewPath, Relocalise, GiveUp, Own] {
             let mut gate = ActionGate::new(&limits());
             let found = gate.apply(PLANNED, Some(&action(kind)), 0);
             assert_eq!((found.target.speed_m_s, found.progress), (0.0, 0.0));

@@ -104,6 +104,8 @@ pub enum RecoveryKind {
     MoveAway = 10,
     /// Stop for good: this task is given up.
     GiveUp = 11,
+    /// An action of the user's own: `action` says which.
+    Own = 12,
 }
 
 /// Why a robot does not obey an action, and stops itself.

@@ -34,6 +34,8 @@ pub(crate) struct Situation {
     pub is_blind: bool,
     /// The fused alarm stands: before it, what has no name counts as nothing.
     pub alarm: bool,
+    /// The robot rests: nothing that it does would show a fault.
+    pub rests: bool,
 }
 
 /// Follows detections and diagnoses.
@@ -121,10 +123,13 @@ impl AlarmFusion {
         let t_ns = detection.header.t_capture_ns;
         let passed_s = t_ns.saturating_sub(self.t_ns) as f64 * 1e-9;
         (self.t_ns, self.readiness) = (t_ns, detection.readiness);
-        let rests = self.readiness == Readiness::NotExcited as u32;
         self.alarm.take(&StageBeliefs {
             t_ns,
-            moved_s: if rests { 0.0 } else { passed_s.min(STEP_MAX_S) },
+            moved_s: if self.rests() {
+                0.0
+            } else {
+                passed_s.min(STEP_MAX_S)
+            },
             alarm: detection.alarm != 0,
             alarm_t_ns: detection.alarm_t_capture_ns,
             alarm_count: detection.alarm_count,
@@ -138,7 +143,12 @@ impl AlarmFusion {
         Situation {
             is_blind: self.blind != 0,
             alarm: self.alarm.stands(),
+            rests: self.rests(),
         }
+    }
+
+    const fn rests(&self) -> bool {
+        self.readiness == Readiness::NotExcited as u32
     }
 
     /// Writes alarm and blindness into the decision. While the detector arms, the robot goes on

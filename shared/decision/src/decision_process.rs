@@ -12,7 +12,7 @@ use crate::error::SupervisorError;
 use crate::inputs::Inputs;
 use crate::latch::stands;
 use crate::mapping::{self, ActionMeaning};
-use crate::policy::{self, Worth};
+use crate::policy;
 use crate::settings::Settings;
 use crate::stage_loss::StageLossMonitor;
 
@@ -54,7 +54,6 @@ pub(crate) struct DecisionProcess {
     pub model: Pomdp,
     pub tracker: Tracker,
     pub decider: Decider,
-    pub worth: Worth,
     pub actions: Vec<ActionMeaning>,
     pub losses: StageLossMonitor,
     /// One number per state, of no meaning between two uses.
@@ -81,7 +80,6 @@ impl DecisionProcess {
         let solution = mdp::solve(&model)?;
         Ok(Self {
             decider: policy::decider(&model, &solution, solved, settings)?,
-            worth: Worth::new(solution, actions.len()),
             tracker: Tracker::new(&model),
             losses: StageLossMonitor::new(blind_after_misses),
             scratch: vec![0.0; model.states().len()],

@@ -11,14 +11,41 @@
 //! not stand, or after a time. An action that the robot says is running is not ended by the usual
 //! time, but by the longest that any action may last; a call for help, or a task given up, by none.
 
+use std::collections::BTreeMap;
+
 use vigil_blocks::{ActionOutcome, DetectionBelief, Symptoms};
 
-/// Symptoms of monitors.
-const MONITORS: u32 = Symptoms::EPS | Symptoms::EPM | Symptoms::LD | Symptoms::SD;
+use crate::settings::{Counts, OwnSymptom};
+
 /// The two forms of an error in position.
 const POSITION: u32 = Symptoms::EPS | Symptoms::EPM;
-/// Outcomes.
-const OUTCOMES: u32 = Symptoms::BO | Symptoms::ALT | Symptoms::NNA;
+
+/// Which symptoms count when, as bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct SymptomKinds {
+    /// Those that end an epoch when they rise.
+    rising: u32,
+    /// Those of them that count while they stand, too.
+    standing: u32,
+    /// Those that come with an outcome.
+    outcomes: u32,
+}
+
+impl SymptomKinds {
+    /// The paper's, and `own`.
+    pub(crate) fn new(own: &BTreeMap<String, OwnSymptom>) -> Self {
+        let of = |counts| {
+            let bits = own.values().filter(|own| own.counts == counts);
+            bits.fold(0, |set, own| set | 1 << own.bit)
+        };
+        let standing = POSITION | of(Counts::Standing);
+        Self {
+            rising: standing | Symptoms::LD | Symptoms::SD | of(Counts::Rising),
+            standing,
+            outcomes: Symptoms::BO | Symptoms::ALT | Symptoms::NNA | of(Counts::Outcome),
+        }
+    }
+}
 
 /// How an epoch ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,8 +70,9 @@ pub(crate) struct Limits {
 }
 
 /// What an epoch has gathered.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct Epoch {
+    kinds: SymptomKinds,
     began_ns: Option<u64>,
     standing: u32,
     risen: u32,
@@ -53,6 +81,18 @@ pub(crate) struct Epoch {
 }
 
 impl Epoch {
+    /// Nothing has been seen yet.
+    pub(crate) const fn new(kinds: SymptomKinds) -> Self {
+        Self {
+            kinds,
+            began_ns: None,
+            standing: 0,
+            risen: 0,
+            outcomes: 0,
+            is_answered: false,
+        }
+    }
+
     /// Takes what the detector says, and how the epoch ends if it does: `decision_seq` is the
     /// decision whose outcome is waited for.
     pub(crate) fn take(
@@ -61,7 +101,7 @@ impl Epoch {
         decision_seq: u64,
         limits: &Limits,
     ) -> Option<End> {
-        let is_new = self.take_symptoms(detection.symptoms & MONITORS);
+        let is_new = self.take_symptoms(detection.symptoms & self.kinds.rising);
         let outcome = |outcome: ActionOutcome| {
             detection.action_seq == decision_seq && detection.action_outcome == outcome as u32
         };
@@ -71,7 +111,7 @@ impl Epoch {
         );
         if (done || failed) && !self.is_answered {
             self.is_answered = true;
-            self.outcomes = detection.symptoms & OUTCOMES;
+            self.outcomes = detection.symptoms & self.kinds.outcomes;
             return Some(if done { End::Done } else { End::Failed });
         }
         let t_ns = detection.header.t_capture_ns;
@@ -117,8 +157,9 @@ impl Epoch {
     pub(crate) fn take_set(&mut self, t_ns: u64, end: End) -> u32 {
         let mut set = self.risen | self.outcomes;
         if self.standing & POSITION != 0 {
-            set = set & !POSITION | self.standing & POSITION;
+            set &= !POSITION;
         }
+        set |= self.standing & self.kinds.standing;
         (self.risen, self.outcomes) = (0, 0);
         if end != End::Unfinished {
             self.began_ns = Some(t_ns);
@@ -134,7 +175,7 @@ impl Epoch {
 
     /// Nothing has been seen.
     pub(crate) fn reset(&mut self) {
-        *self = Self::default();
+        *self = Self::new(self.kinds);
     }
 }
 
@@ -155,6 +196,10 @@ mod tests {
         detection
     }
 
+    fn epoch() -> Epoch {
+        Epoch::new(SymptomKinds::new(&BTreeMap::new()))
+    }
+
     const FOLLOWS: Limits = Limits {
         epoch_ns: Some(10 * S),
         running_ns: Some(30 * S),
@@ -168,7 +213,7 @@ mod tests {
 
     #[test]
     fn a_symptom_ends_the_epoch_when_it_rises_and_counts_once_in_each() {
-        let mut epoch = Epoch::default();
+        let mut epoch = epoch();
         let mut take = |t_s, symptoms| {
             let end = epoch.take(&said(t_s, symptoms, RUNNING), 1, &FOLLOWS);
             end.map(|end| epoch.take_set(t_s * S, end))
@@ -194,8 +239,29 @@ mod tests {
     }
 
     #[test]
+    fn a_symptom_of_the_users_own_counts_as_it_is_declared() {
+        let own = [
+            ("BUMP", 8, Counts::Rising),
+            ("BATTERY", 9, Counts::Standing),
+            ("DOCKED", 10, Counts::Outcome),
+        ];
+        let own = own.map(|(name, bit, counts)| (name.to_owned(), OwnSymptom { bit, counts }));
+        let [bump, battery, docked] = [1 << 8, 1 << 9, 1 << 10];
+        let mut epoch = Epoch::new(SymptomKinds::new(&own.into()));
+        let mut take = |t_s, symptoms, outcome| {
+            let end = epoch.take(&said(t_s, symptoms, (1, outcome)), 1, &ENDS);
+            end.map(|end| epoch.take_set(t_s * S, end))
+        };
+        let all = bump | battery | docked;
+        assert_eq!(take(0, all, ActionOutcome::Running), Some(bump | battery));
+        assert_eq!(take(1, all, ActionOutcome::Running), None);
+        let done = take(2, all, ActionOutcome::Succeeded);
+        assert_eq!(done, Some(battery | docked), "the bump is no news");
+    }
+
+    #[test]
     fn an_outcome_counts_once_and_only_that_of_the_decision() {
-        let mut epoch = Epoch::default();
+        let mut epoch = epoch();
         let mut take = |t_s, symptoms, seq, outcome, decision| {
             epoch.take(&said(t_s, symptoms, (seq, outcome)), decision, &ENDS)
         };
@@ -213,7 +279,7 @@ mod tests {
 
     #[test]
     fn what_runs_is_ended_by_the_longest_time_alone_and_what_is_held_by_none() {
-        let mut epoch = Epoch::default();
+        let mut epoch = epoch();
         let mut take = |t_s, symptoms, limits: &Limits| {
             let end = epoch.take(&said(t_s, symptoms, RUNNING), 1, limits);
             end.inspect(|end| _ = epoch.take_set(t_s * S, *end))
@@ -234,7 +300,7 @@ mod tests {
 
     #[test]
     fn an_action_of_which_the_robot_says_nothing_is_done_after_an_epoch() {
-        let mut epoch = Epoch::default();
+        let mut epoch = epoch();
         let mut take = |t_s| {
             let silent = said(t_s, 0, (0, ActionOutcome::None));
             epoch.take(&silent, 1, &ENDS)

@@ -45,24 +45,33 @@ pub enum SupervisorError {
     NoCompensation(usize, String),
     /// An observation is no set of symptoms and outcomes.
     #[error(
-        "observation '{0}' of the decision model is no set of symptoms; allowed are 'none', and \
-         EPS, EPM, LD, SD, BO, ALT, NNA, each at most once, joined by '_'"
+        "observation '{found}' of the decision model is no set of symptoms; allowed are 'none', \
+         and {allowed}, each at most once, joined by '_'"
     )]
-    NoSet(String),
+    NoSet {
+        /// The observation.
+        found: String,
+        /// Names of the symptoms.
+        allowed: String,
+    },
     /// Two observations are the same set.
     #[error("observations '{0}' and '{1}' of the decision model are the same set of symptoms")]
     SameSet(String, String),
     /// A symptom alone, or silence, has no observation.
     #[error(
         "the decision model has no observation '{0}'; with supervisor.evidence = \"symptoms\" it \
-         needs none, EPS, EPM, LD, SD, BO, ALT and NNA, and those of their sets that can occur"
+         needs 'none', each symptom that it names alone, and those of their sets that can occur"
     )]
-    NoObservation(&'static str),
-    /// A state that the settings name is not in the model.
-    #[error("supervisor.{key}: the decision model has no state '{found}'; allowed are {allowed}")]
-    NamedState {
-        /// Key that names it.
-        key: &'static str,
+    NoObservation(String),
+    /// A symptom of the settings that the decision model does not know.
+    #[error("[supervisor.symptoms] names '{0}', of which the decision model has no observation")]
+    ForeignSymptom(String),
+    /// No state is of a lost robot.
+    #[error(
+        "supervisor.lost_state: no state of the decision model is '{found}', alone or joined by \
+         '-' with another exception; its states are {allowed}"
+    )]
+    LostState {
         /// Name that was given.
         found: String,
         /// Names of the model's states.

@@ -1,6 +1,6 @@
 //! Decisions about the leaves of the fault tree: the identifier's belief is the evidence.
 
-use vigil_blocks::{Action, ControlMode, DetectionBelief, FAULT_NODES, FaultBelief, RecoveryKind};
+use vigil_blocks::{Action, ControlMode, DetectionBelief, FaultBelief, RecoveryKind};
 use vigil_pomdp::policy::Measure;
 use vigil_pomdp::{Choice, Control};
 use vigil_robot::{Description, FaultTree};
@@ -10,19 +10,12 @@ use crate::decision_process::{DecisionProcess, DecisionRule, Instruction};
 use crate::error::SupervisorError;
 use crate::inputs::Inputs;
 use crate::latch::{Latch, stands};
-use crate::mapping::{self, Compensation};
+use crate::mapping::Compensation;
 use crate::settings::Settings;
-use crate::state_belief::{self, write_weights};
-use crate::states::{self, Leaf, LeafKind, StateMeaning, Subject};
+use crate::state_belief::{self, MOVED, distance, normalise, write_fallback, write_weights};
+use crate::states::{self, StateMeaning, Subject};
 use crate::switching_cost::SwitchingCost;
-
-/// A belief that has moved by more than this since the last decision (half the sum of absolute
-/// differences) opens another at once. Chosen by hand: it changes no value by more than a twentieth
-/// of its range. Smaller decides in almost every cycle; larger lets a decision wait for its epoch.
-const MOVED: f64 = 0.05;
-
-/// A fault is named above this probability: more likely than not.
-const NAMED: f64 = 0.5;
+use crate::wheels::Wheels;
 
 /// Tells when an epoch is over.
 struct EpochClock {
@@ -51,16 +44,11 @@ pub(crate) struct FaultDecision {
     process: DecisionProcess,
     tree_hash: u64,
     states: Vec<StateMeaning>,
-    leaves: Vec<Leaf>,
-    /// Probability of every node of the tree, as of the last decision.
-    p: [f64; FAULT_NODES],
-    compensation: Vec<Compensation>,
+    wheels: Wheels,
     epoch_clock: EpochClock,
     decision_t_capture_ns: Option<u64>,
     latch: Latch,
     switching: SwitchingCost,
-    /// The wheel that the present action is about.
-    wheel: Option<usize>,
     instruction: Option<Instruction>,
 }
 
@@ -75,16 +63,13 @@ impl FaultDecision {
         compensation: Vec<Compensation>,
     ) -> Result<Self, SupervisorError> {
         let (model, actions) = (&process.model, &process.actions);
-        let states = states::states(model, tree)?;
-        let leaves = states::leaves(tree, robot);
-        mapping::check_compensation(model, &leaves, actions, &compensation)?;
+        let states = states::states(model.states(), tree)?;
+        let wheels = Wheels::new(model, actions, tree, robot, compensation)?;
         let mut rule = Self {
             process,
             tree_hash: tree.hash(),
             states,
-            leaves,
-            p: [0.0; FAULT_NODES],
-            compensation,
+            wheels,
             epoch_clock: EpochClock {
                 epoch_ns: (settings.epoch_ms * 1e6) as u64,
                 t_capture_ns: None,
@@ -92,7 +77,6 @@ impl FaultDecision {
             decision_t_capture_ns: None,
             latch: Latch::default(),
             switching: SwitchingCost::new(settings.switching_cost),
-            wheel: None,
             instruction: None,
         };
         rule.begin();
@@ -107,7 +91,7 @@ impl FaultDecision {
             *weight = is_nominal(meaning);
         }
         self.process.tracker.anchor(&self.process.scratch);
-        self.p = [0.0; FAULT_NODES];
+        self.wheels.forget();
         self.decision_t_capture_ns = None;
         self.switching.forget();
         let best = self.process.decider.decide(self.process.tracker.belief());
@@ -129,14 +113,14 @@ impl FaultDecision {
         let is_due = timed
             || process.control_mode != ControlMode::Policy
             || distance(before, weights) > MOVED
-            || self.wheels_have_moved(diagnosis);
+            || self.wheels.have_moved(diagnosis);
         if !is_due {
             return;
         }
         let process = &mut self.process;
         process.control_mode = ControlMode::Policy;
         process.tracker.anchor(&process.scratch);
-        self.p = diagnosis.p;
+        self.wheels.take(diagnosis);
         self.decide(t_capture_ns);
     }
 
@@ -160,44 +144,14 @@ impl FaultDecision {
         }
     }
 
-    /// Leaves of one state are treated alike, but for the wheel.
-    fn wheels_have_moved(&self, diagnosis: &FaultBelief) -> bool {
-        let of_wheels = self.leaves.iter().filter(|leaf| leaf.wheel.is_some());
-        let at = |p: &[f64], node: usize| p.get(node).copied().unwrap_or(0.0);
-        of_wheels
-            .map(|leaf| (at(&diagnosis.p, leaf.node) - at(&self.p, leaf.node)).abs())
-            .any(|moved| moved > MOVED)
-    }
-
-    /// The identifier is lost. The detector says how probable a fault is, the belief before the
-    /// loss which one, and without that it is unknown. Before an alarm the detector's odds mean
-    /// nothing.
+    /// The identifier is lost.
     fn fall_back(&mut self, detection: &DetectionBelief, alarm: bool) {
         self.begin_run(detection.run_id);
         let t_capture_ns = detection.header.t_capture_ns;
         self.pass_time(t_capture_ns);
         let process = &mut self.process;
-        let p_fault = match alarm {
-            true => detection.p_fault.clamp(0.0, 1.0),
-            false => 0.0,
-        };
-        let is_fault =
-            |meaning: &StateMeaning| !matches!(meaning.subject, Subject::Nominal | Subject::Done);
         let belief = process.tracker.belief();
-        let of_faults = belief.iter().zip(&self.states).filter(|(_, m)| is_fault(m));
-        let faulty: f64 = of_faults.map(|(b, _)| b).sum();
-        let unknown = |m: &StateMeaning| m.subject == Subject::Unknown;
-        let unknown = self.states.iter().position(unknown);
-        let scratch = process.scratch.iter_mut().enumerate();
-        for (((state, weight), b), meaning) in scratch.zip(belief).zip(&self.states) {
-            *weight = match meaning.subject {
-                Subject::Nominal => 1.0 - p_fault,
-                Subject::Done => 0.0,
-                _ if faulty > 0.0 => p_fault * (b / faulty),
-                _ if Some(state) == unknown => p_fault,
-                _ => 0.0,
-            };
-        }
+        write_fallback(detection, &self.states, alarm, belief, &mut process.scratch);
         process.tracker.anchor(&process.scratch);
         process.control_mode = ControlMode::Fallback;
         process.log_evidence = 0.0;
@@ -235,15 +189,7 @@ impl FaultDecision {
         let kind = |action: usize| actions.get(action).map_or(RecoveryKind::Stop, |m| m.kind);
         let before = std::mem::replace(&mut process.choice, self.latch.choose(best, kind)).action;
         let action = process.choice.action;
-        let about = match process.kind(action) {
-            RecoveryKind::Compensate => self.most_probable_wheel(LeafKind::Stuck),
-            RecoveryKind::IgnoreEncoder => self.most_probable_wheel(LeafKind::Encoder),
-            _ => return self.wheel = None,
-        };
-        // Another wheel than that of the action that goes on has to be more likely than not.
-        let held = self.wheel.filter(|_| action == before);
-        let other = about.filter(|(_, p)| held.is_none() || *p > NAMED);
-        self.wheel = other.map(|(wheel, _)| wheel).or(held);
+        self.wheels.choose(process.kind(action), action == before);
     }
 
     fn instruction(&self) -> Instruction {
@@ -255,36 +201,9 @@ impl FaultDecision {
         Instruction {
             action,
             kind,
-            wheel: self.wheel,
+            wheel: self.wheels.about(),
         }
     }
-
-    /// The wheel with such a fault, and its probability.
-    fn most_probable_wheel(&self, kind: LeafKind) -> Option<(usize, f64)> {
-        let mut best: Option<(usize, f64)> = None;
-        for leaf in self.leaves.iter().filter(|leaf| leaf.kind == kind) {
-            let p = self.p.get(leaf.node).copied().unwrap_or(0.0);
-            let is_more = p > best.map_or(0.0, |(_, most)| most);
-            best = leaf
-                .wheel
-                .filter(|_| is_more)
-                .map(|wheel| (wheel, p))
-                .or(best);
-        }
-        best
-    }
-}
-
-/// Some weight is more than 0: a diagnosis that has none is not sound.
-fn normalise(weights: &mut [f64]) {
-    let sum: f64 = weights.iter().sum();
-    weights.iter_mut().for_each(|weight| *weight /= sum);
-}
-
-/// Half the sum of absolute differences.
-fn distance(one: &[f64], other: &[f64]) -> f64 {
-    let differences = one.iter().zip(other).map(|(a, b)| (a - b).abs());
-    0.5 * differences.sum::<f64>()
 }
 
 /// How well a belief was predicted: the mean of the logarithm of the predicted probability, over
@@ -356,14 +275,6 @@ impl DecisionRule for FaultDecision {
             self.process.decision_seq += 1;
         }
         self.process.write(instruction, action);
-        let compensated = instruction
-            .wheel
-            .filter(|_| instruction.kind == RecoveryKind::Compensate);
-        let counter =
-            compensated.and_then(|wheel| self.compensation.iter().find(|c| c.wheel == wheel));
-        if let Some(counter) = counter {
-            action.curvature_gain = counter.curvature_gain;
-            action.curvature_offset = counter.curvature_offset_1_m;
-        }
+        self.wheels.write(instruction.kind, action);
     }
 }

@@ -19,23 +19,6 @@ pub struct Compensation {
     pub curvature_offset_1_m: f64,
 }
 
-/// Index of a state that the settings name, if they do.
-pub(crate) fn state(
-    model: &Pomdp,
-    key: &'static str,
-    name: Option<&str>,
-) -> Result<Option<usize>, SupervisorError> {
-    let index = |name: &str| {
-        let found = model.states().iter().position(|state| state == name);
-        found.ok_or_else(|| SupervisorError::NamedState {
-            key,
-            found: name.to_owned(),
-            allowed: model.states().join(", "),
-        })
-    };
-    name.map(index).transpose()
-}
-
 /// Checks that a block can carry the model's belief and values.
 pub(crate) fn check_size(model: &Pomdp) -> Result<(), SupervisorError> {
     let (states, actions) = (model.states().len(), model.actions().len());
@@ -50,6 +33,10 @@ pub(crate) fn check_size(model: &Pomdp) -> Result<(), SupervisorError> {
 pub(crate) struct ActionMeaning {
     pub kind: RecoveryKind,
     pub speed_scale: f64,
+    /// What a robot does and then has done.
+    pub has_end: bool,
+    /// The longest epoch, ns, where it is not that of the others.
+    pub epoch_ns: Option<u64>,
 }
 
 /// Meaning of every action, in the model's order.
@@ -71,7 +58,12 @@ pub(crate) fn actions(
             let speed_scale = action
                 .speed_scale
                 .unwrap_or_else(|| usual_speed_scale(kind));
-            Ok(ActionMeaning { kind, speed_scale })
+            Ok(ActionMeaning {
+                kind,
+                speed_scale,
+                has_end: action.has_end.unwrap_or_else(|| usually_has_end(kind)),
+                epoch_ns: action.epoch_ms.map(|ms| (ms * 1e6) as u64),
+            })
         })
         .collect()
 }
@@ -86,13 +78,28 @@ const fn usual_speed_scale(kind: RecoveryKind) -> f64 {
         | RecoveryKind::CallForHelp
         | RecoveryKind::NewPath
         | RecoveryKind::Relocalise
-        | RecoveryKind::GiveUp => 0.0,
+        | RecoveryKind::GiveUp
+        | RecoveryKind::Own => 0.0,
         RecoveryKind::SlowDown => 0.5,
         RecoveryKind::Compensate => 0.7,
         RecoveryKind::GoOn
         | RecoveryKind::IgnoreEncoder
         | RecoveryKind::GoThrough
         | RecoveryKind::MoveAway => 1.0,
+    }
+}
+
+const fn usually_has_end(kind: RecoveryKind) -> bool {
+    use RecoveryKind as R;
+    match kind {
+        R::NewPath
+        | R::Relocalise
+        | R::GoThrough
+        | R::MoveAway
+        | R::CallForHelp
+        | R::GiveUp
+        | R::Own => true,
+        R::None | R::GoOn | R::SlowDown | R::Stop | R::Compensate | R::IgnoreEncoder => false,
     }
 }
 
@@ -139,6 +146,7 @@ mod tests {
                     R::NewPath,
                     R::Relocalise,
                     R::GiveUp,
+                    R::Own,
                 ][..],
             ),
             (0.5, &[R::SlowDown]),
@@ -176,6 +184,8 @@ mod tests {
         let compensate = ActionMeaning {
             kind: RecoveryKind::Compensate,
             speed_scale: 0.7,
+            has_end: false,
+            epoch_ns: None,
         };
         let leaves = [(3, LeafKind::Encoder), (4, LeafKind::Stuck)].map(|(wheel, kind)| Leaf {
             node: 1,

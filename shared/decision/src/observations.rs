@@ -1,51 +1,82 @@
 //! From a set of symptoms and outcomes to an observation of the decision model, by name.
 
+use std::collections::BTreeMap;
+
 use vigil_blocks::Symptoms;
 use vigil_pomdp::Pomdp;
 
 use crate::error::SupervisorError;
+use crate::settings::OwnSymptom;
 
 /// Name of the empty set.
 const NONE: &str = "none";
 
-/// The observation for each set.
+/// The observation for each set of symptoms that the model knows.
 #[derive(Debug, Clone)]
 pub(crate) struct Observations {
-    index: [Option<usize>; Symptoms::ALL as usize + 1],
+    /// Sets, in order, and their observations.
+    sets: Vec<(u32, usize)>,
+    /// The symptoms that occur in any.
+    known: u32,
 }
 
 impl Observations {
-    /// Of a model all of whose observations are sets.
-    pub(crate) fn new(model: &Pomdp) -> Result<Self, SupervisorError> {
-        let mut index = [None; Symptoms::ALL as usize + 1];
+    /// Of a model all of whose observations are sets; `own` are symptoms beside the usual ones.
+    ///
+    /// # Errors
+    /// [`SupervisorError`] naming what is no set, is there twice, or is missing.
+    pub(crate) fn new(
+        model: &Pomdp,
+        own: &BTreeMap<String, OwnSymptom>,
+    ) -> Result<Self, SupervisorError> {
+        let own = own.iter().map(|(name, of)| (name.as_str(), 1 << of.bit));
+        let named: Vec<(&str, u32)> = Symptoms::NAMED.into_iter().chain(own).collect();
+        let mut sets: Vec<(u32, usize)> = Vec::new();
         for (z, name) in model.observations().iter().enumerate() {
-            let set = set_of(name).ok_or_else(|| SupervisorError::NoSet(name.clone()))?;
-            if let Some(twice) = index[set as usize].replace(z) {
-                let other = model.observations()[twice].clone();
+            let set = set_of(name, &named).ok_or_else(|| SupervisorError::NoSet {
+                found: name.clone(),
+                allowed: named
+                    .iter()
+                    .map(|(name, _)| *name)
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            })?;
+            if let Some((_, twice)) = sets.iter().find(|(other, _)| *other == set) {
+                let other = model.observations()[*twice].clone();
                 return Err(SupervisorError::SameSet(name.clone(), other));
             }
+            sets.push((set, z));
         }
-        for (basic, bit) in [(NONE, 0)].iter().chain(&Symptoms::NAMED) {
-            if index[*bit as usize].is_none() {
-                return Err(SupervisorError::NoObservation(basic));
+        let known = sets.iter().fold(0, |known, (set, _)| known | set);
+        let is_alone = |bit: u32| sets.iter().any(|(set, _)| *set == bit);
+        for (name, bit) in [(NONE, 0)].iter().chain(&named) {
+            if known & bit == *bit && !is_alone(*bit) {
+                return Err(SupervisorError::NoObservation((*name).to_owned()));
+            }
+            if known & bit != *bit && !Symptoms::NAMED.contains(&(*name, *bit)) {
+                return Err(SupervisorError::ForeignSymptom((*name).to_owned()));
             }
         }
-        Ok(Self { index })
+        sets.sort_unstable();
+        Ok(Self { sets, known })
     }
 
-    /// The model's observation; `None` if the model has none for this set.
+    /// The model's observation; `None` if the model has none for this set. Symptoms that the model
+    /// does not know are left out.
     pub(crate) fn index(&self, set: u32) -> Option<usize> {
-        self.index.get(set as usize).copied().flatten()
+        let known = set & self.known;
+        let at = self.sets.binary_search_by_key(&known, |(set, _)| *set);
+        at.ok().map(|at| self.sets[at].1)
     }
 }
 
 /// Bits of a set by its name: its symptoms, joined by `_` in any order.
-fn set_of(name: &str) -> Option<u32> {
+fn set_of(name: &str, named: &[(&str, u32)]) -> Option<u32> {
     if name == NONE {
         return Some(0);
     }
     name.split('_').try_fold(0, |set, part| {
-        let (_, bit) = Symptoms::NAMED.iter().find(|(basic, _)| *basic == part)?;
+        let (_, bit) = named.iter().find(|(basic, _)| *basic == part)?;
         (set & bit == 0).then_some(set | bit)
     })
 }
@@ -56,8 +87,10 @@ mod tests {
 
     #[test]
     fn a_set_is_named_by_its_symptoms_in_any_order_each_once() {
+        let set_of = |name| set_of(name, &[("EPM", 2), ("LD", 4), ("DOOR", 1 << 9)]);
         assert_eq!(set_of("none"), Some(0));
         assert_eq!(set_of("EPM"), Some(Symptoms::EPM));
+        assert_eq!(set_of("DOOR_LD"), Some(1 << 9 | Symptoms::LD));
         for name in ["EPM_LD", "LD_EPM"] {
             assert_eq!(set_of(name), Some(Symptoms::EPM | Symptoms::LD));
         }

@@ -2,8 +2,8 @@
 
 use crate::settings::{self, Settings};
 use vigil_pomdp::mdp::Solution;
-use vigil_pomdp::policy::{Dual, Gate, Information, Measure, PolicyKind};
-use vigil_pomdp::{Decider, PointBased, Policy, Pomdp, QMdp};
+use vigil_pomdp::policy::{Dual, Gate, Information, PolicyKind};
+use vigil_pomdp::{Decider, PointBased, Pomdp};
 
 use crate::error::SupervisorError;
 
@@ -19,32 +19,6 @@ pub(crate) fn decider(
     let allowed = information_actions(model, settings)?;
     let dual = |information| dual(information, settings, allowed);
     Ok(kind.build(model, solution, dual, solved)?)
-}
-
-/// What actions are worth, where the best is not allowed: the decider's values, and where it has
-/// only votes or entropies, which rank nothing but the best, those of Q-MDP.
-pub(crate) struct Worth {
-    policy: QMdp,
-    values: Vec<f64>,
-}
-
-impl Worth {
-    /// For the model of which `solution` is the fully observable relaxation.
-    pub(crate) fn new(solution: Solution, actions: usize) -> Self {
-        Self {
-            policy: QMdp::new(solution),
-            values: vec![0.0; actions],
-        }
-    }
-
-    /// Of every action, after the decider's decision about `belief`.
-    pub(crate) fn values<'a>(&'a mut self, decider: &'a Decider, belief: &[f64]) -> &'a [f64] {
-        if decider.measure() == Measure::Value {
-            return decider.values();
-        }
-        self.policy.evaluate(belief, &mut self.values);
-        &self.values
-    }
 }
 
 fn dual(information: Information, settings: &Settings, allowed: Vec<usize>) -> Dual {

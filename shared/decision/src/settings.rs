@@ -15,13 +15,14 @@ pub struct Settings {
     /// or kinds of the fault tree, `symptoms` if the model's observations are sets of symptoms and
     /// outcomes (`EPM_LD`, `none`).
     pub evidence: Evidence,
-    /// With `symptoms`: the state that means a hardware fault; the identifier's belief in any fault
-    /// of its tree is soft evidence for it. Without one the identifier is not used.
-    pub hardware_state: Option<String>,
-    /// With `hardware_state`: the state of a robot that is lost. What the identifier calls unknown
-    /// is a fault that nobody has modelled, or a pose that jumped: soft evidence for both states.
-    /// Without one the unknown is a hardware fault.
+    /// With `symptoms`: the exception of a robot that is lost, as states name it (`LST`). What the
+    /// identifier calls unknown is a fault that nobody has modelled, or a pose that jumped. Without
+    /// it the unknown is a fault.
     pub lost_state: Option<String>,
+    /// With `symptoms`: symptoms of your own, by the name that the decision model's observations
+    /// have for them, beside EPS, EPM, LD, SD, BO, ALT and NNA. The robot's publisher sets their
+    /// bits in the frame.
+    pub symptoms: BTreeMap<String, OwnSymptom>,
     /// Policy: `qmdp`, `mls` (the best action of the most likely state), `av` (action voting),
     /// `fib` (fast informed bound), or one of these with dual control, which gathers information
     /// while the belief is too uncertain: `dm-X` about the state, `adm-X` about the best action.
@@ -78,6 +79,32 @@ pub struct Settings {
     pub actions: BTreeMap<String, RecoveryAction>,
 }
 
+/// A symptom of the user's own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OwnSymptom {
+    /// Its bit in the frame's symptoms.
+    #[schemars(range(min = 8, max = 31))]
+    pub bit: u32,
+    /// When it counts.
+    #[serde(default)]
+    pub counts: Counts,
+}
+
+/// When a symptom counts as one of a decision epoch's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Counts {
+    /// When it rises: an event, such as a bump.
+    #[default]
+    Rising,
+    /// When it rises, and while it stands at the end of an epoch: a state, such as an empty
+    /// battery.
+    Standing,
+    /// With the outcome that the robot reports of an action.
+    Outcome,
+}
+
 /// What updates the belief over the decision model's states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -106,10 +133,16 @@ pub struct RecoveryAction {
     /// Kind of the recovery.
     pub kind: Recovery,
     /// Factor on the commanded speed. Unless given: 0.5 for `slow_down`, 0.7 for `compensate`, 0
-    /// for what is done standing (`stop`, `call_for_help`, `new_path`, `relocalise`, `give_up`),
-    /// else 1.
+    /// for what is done standing (`stop`, `call_for_help`, `new_path`, `relocalise`, `give_up`,
+    /// `own`), else 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub speed_scale: Option<f64>,
+    /// Whether the robot reports that it is done. Unless given: not for what goes on (`go_on`,
+    /// `slow_down`, `stop`, `compensate`, `ignore_encoder`), else yes.
+    pub has_end: Option<bool>,
+    /// With `symptoms`: the longest epoch of this action, in place of `supervisor.epoch_ms`.
+    #[schemars(range(min = 100.0, max = 60_000.0))]
+    pub epoch_ms: Option<f64>,
 }
 
 /// Kind of a recovery action; see `vigil_blocks::RecoveryKind`.
@@ -138,6 +171,8 @@ pub enum Recovery {
     MoveAway,
     /// Give this task up.
     GiveUp,
+    /// One of your own: the robot's adapter knows it by its number in the decision model.
+    Own,
 }
 
 impl From<Recovery> for RecoveryKind {
@@ -154,6 +189,7 @@ impl From<Recovery> for RecoveryKind {
             Recovery::GoThrough => Self::GoThrough,
             Recovery::MoveAway => Self::MoveAway,
             Recovery::GiveUp => Self::GiveUp,
+            Recovery::Own => Self::Own,
         }
     }
 }

@@ -10,13 +10,18 @@
 //! What has no name is nothing before the fused alarm: the odds of a departure wander on a healthy
 //! robot too, and the alarm alone is calibrated.
 
-use vigil_blocks::{FaultBelief, FaultSet};
+use vigil_blocks::{DetectionBelief, FaultBelief, FaultSet};
 
 use crate::states::{StateMeaning, Subject};
 
 /// A probability may exceed 1 by this much, for rounding. Chosen: far beyond what sums round to.
 /// Smaller might refuse sound input; larger might take damaged input.
 pub(crate) const P_TOLERANCE: f64 = 1e-6;
+
+/// A belief that has moved by more than this since the last decision (half the sum of absolute
+/// differences) opens another at once. Chosen by hand: it changes no value by more than a twentieth
+/// of its range. Smaller decides in almost every cycle; larger lets a decision wait for its epoch.
+pub(crate) const MOVED: f64 = 0.05;
 
 /// A diagnosis says at least this much in all; a sound one sums to 1 or more.
 const P_SUM_MIN: f64 = 0.5;
@@ -38,6 +43,49 @@ pub(crate) fn write_weights(
         divide(set, states, several, weights);
     }
     share_unknown(states, predicted, weights);
+}
+
+/// The same without an identifier: the detector says how probable a fault is, the belief before
+/// the loss which one, and without that it is unknown. Before an alarm the detector's odds mean
+/// nothing.
+pub(crate) fn write_fallback(
+    detection: &DetectionBelief,
+    states: &[StateMeaning],
+    alarm: bool,
+    before: &[f64],
+    weights: &mut [f64],
+) {
+    let p_fault = match alarm {
+        true => detection.p_fault.clamp(0.0, 1.0),
+        false => 0.0,
+    };
+    let is_fault =
+        |meaning: &StateMeaning| !matches!(meaning.subject, Subject::Nominal | Subject::Done);
+    let of_faults = before.iter().zip(states).filter(|(_, m)| is_fault(m));
+    let faulty: f64 = of_faults.map(|(b, _)| b).sum();
+    let unknown = position(states, Subject::Unknown);
+    let weights = weights.iter_mut().enumerate();
+    for (((state, weight), b), meaning) in weights.zip(before).zip(states) {
+        *weight = match meaning.subject {
+            Subject::Nominal => 1.0 - p_fault,
+            Subject::Done => 0.0,
+            _ if faulty > 0.0 => p_fault * (b / faulty),
+            _ if Some(state) == unknown => p_fault,
+            _ => 0.0,
+        };
+    }
+}
+
+/// Makes weights sum to 1. Some is more than 0: a diagnosis that has none is not sound.
+pub(crate) fn normalise(weights: &mut [f64]) {
+    let sum: f64 = weights.iter().sum();
+    weights.iter_mut().for_each(|weight| *weight /= sum);
+}
+
+/// Half the sum of absolute differences.
+pub(crate) fn distance(one: &[f64], other: &[f64]) -> f64 {
+    let differences = one.iter().zip(other).map(|(a, b)| (a - b).abs());
+    0.5 * differences.sum::<f64>()
 }
 
 fn position(states: &[StateMeaning], subject: Subject) -> Option<usize> {

@@ -2,7 +2,6 @@
 //!
 //! Which state a leaf belongs to says [`FaultTree::state_names`].
 
-use vigil_pomdp::Pomdp;
 use vigil_robot::{Description, FaultTree};
 
 use crate::error::SupervisorError;
@@ -82,15 +81,25 @@ pub(crate) fn leaves(tree: &FaultTree, robot: &Description) -> Vec<Leaf> {
     tree.leaves().map(leaf).collect()
 }
 
-/// Meaning of every state, in the model's order.
+/// True if a state may have this name because of what it says about the hardware.
+pub(crate) fn is_of_hardware(name: &str, tree: &FaultTree) -> bool {
+    let names = |leaf| tree.state_names(leaf).any(|of_leaf| of_leaf == name);
+    matches!(name, UNKNOWN | UNKNOWN_OLD | FAULT | SEVERAL)
+        || tree
+            .nodes()
+            .first()
+            .is_some_and(|nominal| nominal.name == name)
+        || tree.leaves().any(names)
+}
+
+/// Meaning of every state, by its name.
 ///
 /// # Errors
 /// [`SupervisorError`] if a leaf, nominal or unknown has no state, or a state of faults no leaf.
 pub(crate) fn states(
-    model: &Pomdp,
+    names: &[String],
     tree: &FaultTree,
 ) -> Result<Vec<StateMeaning>, SupervisorError> {
-    let names = model.states();
     let nominal = tree.nodes()[0].name.as_str();
     let meaning = |name: &String| StateMeaning {
         subject: match name.as_str() {
@@ -153,9 +162,8 @@ mod tests {
 
     /// Leaves of the states with these names.
     fn held(names: &str) -> Result<Vec<u64>, SupervisorError> {
-        let text =
-            format!("discount: 0.9\nvalues: reward\nstates: {names}\nactions: 1\nT: * identity\n");
-        let meanings = states(&Pomdp::parse(&text).unwrap(), &tree())?;
+        let names: Vec<String> = names.split(' ').map(str::to_owned).collect();
+        let meanings = states(&names, &tree())?;
         Ok(meanings.iter().map(|meaning| meaning.leaves).collect())
     }
 

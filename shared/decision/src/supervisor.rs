@@ -46,7 +46,8 @@ impl Supervisor {
                 Box::new(rule)
             }
             settings::Evidence::Symptoms => {
-                Box::new(SymptomDecision::new(process, tree, settings)?)
+                let rule = SymptomDecision::new(process, tree, robot, settings, compensation)?;
+                Box::new(rule)
             }
         };
         Ok(Self {

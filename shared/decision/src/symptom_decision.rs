@@ -1,36 +1,40 @@
-//! Decisions about exceptions of the navigation: symptoms and outcomes are the evidence.
+//! Decisions about exceptions of the navigation: symptoms and outcomes are the evidence, and what
+//! the identifier says about the hardware.
 
 use vigil_blocks::{Action, ControlMode, DetectionBelief, FaultBelief, RecoveryKind};
-use vigil_pomdp::policy::choose_among;
-use vigil_robot::FaultTree;
+use vigil_robot::{Description, FaultTree};
 
 use crate::alarm_fusion::Situation;
 use crate::decision_process::{DecisionProcess, DecisionRule, Instruction};
-use crate::epoch::{End, Epoch, Limits};
+use crate::epoch::{End, Epoch, Limits, SymptomKinds};
 use crate::error::SupervisorError;
-use crate::hardware::HardwareEvidence;
+use crate::hardware_belief::HardwareBelief;
 use crate::inputs::Inputs;
 use crate::latch::Latch;
-use crate::mapping::{self, ActionMeaning};
+use crate::mapping::{ActionMeaning, Compensation};
 use crate::observations::Observations;
 use crate::settings::Settings;
+use crate::state_belief::{MOVED, distance};
+use crate::wheels::Wheels;
 
 /// Tracks the belief over exceptions, one step an epoch, and chooses actions.
 ///
-/// At the end of an [`Epoch`] the tracker takes its set as one observation, then the identifier's
-/// soft evidence. An action that is not done mends nothing: where the robot says that it failed,
-/// where it takes longer than any may, and where a symptom rises before its end, the step is one of
-/// following the path. Only of what reports its outcome as an observation (GO, NP) the failure is a
-/// step of its own: the model knows what it says that no outcome came. A set that is impossible
-/// after the action, or of which the model has no observation, is counted, and the belief becomes
-/// the prediction with 0.01 of the start belief mixed in.
+/// At the end of an [`Epoch`] the tracker takes its set as one observation. What the identifier
+/// says about the hardware is taken over then, and at once when it moves the belief. An action that
+/// is not done mends nothing: where the robot says that it failed, where it takes longer than any
+/// may, and where a symptom rises before its end, the step is one of following the path. Only of
+/// what reports its outcome as an observation (GO, NP) the failure is a step of its own: the model
+/// knows what it says that no outcome came. A set that is impossible after the action, or of which
+/// the model has no observation, is counted, and the belief becomes the prediction with 0.01 of the
+/// start belief mixed in.
 ///
 /// A call for help, or a task given up, stands until a new run or a reset, whatever is believed
 /// meanwhile: a robot that stands looks healthy.
 pub(crate) struct SymptomDecision {
     process: DecisionProcess,
     observations: Observations,
-    hardware: Option<HardwareEvidence>,
+    hardware: Option<HardwareBelief>,
+    wheels: Wheels,
     epoch: Epoch,
     epoch_ns: u64,
     action_ns: u64,
@@ -45,20 +49,21 @@ impl SymptomDecision {
     pub(crate) fn new(
         mut process: DecisionProcess,
         tree: &FaultTree,
+        robot: &Description,
         settings: &Settings,
+        compensation: Vec<Compensation>,
     ) -> Result<Self, SupervisorError> {
-        let model = &process.model;
-        let state = |key, name: &Option<String>| mapping::state(model, key, name.as_deref());
-        let lost = state("lost_state", &settings.lost_state)?;
-        let hardware = state("hardware_state", &settings.hardware_state)?
-            .map(|state| HardwareEvidence::new(model, state, lost, tree.hash()));
-        let observations = Observations::new(model)?;
+        let (model, actions) = (&process.model, &process.actions);
+        let hardware = HardwareBelief::new(model, tree, settings.lost_state.as_deref())?;
+        let wheels = Wheels::new(model, actions, tree, robot, compensation)?;
+        let observations = Observations::new(model, &settings.symptoms)?;
         process.decision_seq = 1;
         let mut rule = Self {
             process,
             observations,
             hardware,
-            epoch: Epoch::default(),
+            wheels,
+            epoch: Epoch::new(SymptomKinds::new(&settings.symptoms)),
             epoch_ns: (settings.epoch_ms * 1e6) as u64,
             action_ns: (settings.action_max_s * 1e9) as u64,
             latch: Latch::default(),
@@ -68,26 +73,25 @@ impl SymptomDecision {
         Ok(rule)
     }
 
-    fn take_diagnosis(&mut self, diagnosis: &FaultBelief, was_lost: bool) {
+    fn take_diagnosis(&mut self, diagnosis: &FaultBelief, situation: Situation) {
         self.begin_run(diagnosis.run_id);
         let Some(hardware) = &mut self.hardware else {
             return;
         };
-        if was_lost {
-            hardware.forget();
+        hardware.take(diagnosis, situation, self.process.tracker.belief());
+        let wheels_moved = self.wheels.have_moved(diagnosis);
+        if wheels_moved {
+            self.wheels.take(diagnosis);
         }
-        if hardware.add(diagnosis) {
-            self.anchor();
-            self.choose_between_epochs();
-        }
+        self.follow_hardware(wheels_moved);
     }
 
-    fn take_detection(&mut self, detection: &DetectionBelief) {
+    fn take_detection(&mut self, detection: &DetectionBelief, situation: Situation) {
         self.begin_run(detection.run_id);
         self.process.control_mode = ControlMode::Policy;
         if self.process.losses.identifier_is_lost() {
             self.process.control_mode = ControlMode::Fallback;
-            self.take_alarm(detection);
+            self.take_alarm(detection, situation);
         }
         let limits = self.limits();
         let Some(end) = self
@@ -99,9 +103,7 @@ impl SymptomDecision {
         let set = self.epoch.take_set(detection.header.t_capture_ns, end);
         self.track(set, end);
         let before = self.process.choice.action;
-        let again = end != End::Unfinished
-            && self.latch.action().is_none()
-            && has_end(self.process.kind(before));
+        let again = end != End::Unfinished && self.latch.action().is_none() && self.has_end(before);
         self.choose();
         // What has an end is done again when it is decided again; what goes on, goes on.
         if self.process.choice.action != before || again {
@@ -110,43 +112,54 @@ impl SymptomDecision {
     }
 
     /// The identifier is lost: the detector says whether something is wrong.
-    fn take_alarm(&mut self, detection: &DetectionBelief) {
+    fn take_alarm(&mut self, detection: &DetectionBelief, situation: Situation) {
         if !(0.0..=1.0).contains(&detection.p_fault) {
             self.process.refuse();
-        } else if let Some(hardware) = &mut self.hardware
-            && hardware.add_alarm(detection)
-        {
-            self.anchor();
-            self.choose_between_epochs();
+        } else if let Some(hardware) = &mut self.hardware {
+            hardware.take_alarm(detection, situation, self.process.tracker.belief());
+            self.follow_hardware(false);
         }
     }
 
-    /// Takes over the probabilities of the identifier, or of the detector in its place.
-    fn anchor(&mut self) {
-        let Some(hardware) = &self.hardware else {
-            return;
-        };
-        let process = &mut self.process;
-        let belief = process.tracker.belief();
-        hardware.anchored(belief, process.model.start(), &mut process.scratch);
-        process.tracker.anchor(&process.scratch);
-    }
-
-    /// No step of the model: what the epoch has gathered stays.
-    fn choose_between_epochs(&mut self) {
+    /// Takes over what is known of the hardware if that moves the belief, and decides anew: no step
+    /// of the model, so that what the epoch has gathered stays.
+    fn follow_hardware(&mut self, wheels_moved: bool) {
         let before = self.process.choice.action;
-        self.choose();
+        if self.take_over(MOVED) || wheels_moved {
+            self.choose();
+        }
         if self.process.choice.action != before {
             self.open_decision();
         }
     }
 
+    /// Takes over what is known of the hardware; true if that moves the belief by more than `least`.
+    fn take_over(&mut self, least: f64) -> bool {
+        let Some(hardware) = &self.hardware else {
+            return false;
+        };
+        let process = &mut self.process;
+        let belief = process.tracker.belief();
+        hardware.write_joint(belief, process.model.start(), &mut process.scratch);
+        let moves = distance(belief, &process.scratch) > least;
+        if moves {
+            process.tracker.anchor(&process.scratch);
+        }
+        moves
+    }
+
+    fn has_end(&self, action: usize) -> bool {
+        self.process.actions.get(action).is_some_and(|m| m.has_end)
+    }
+
     fn limits(&self) -> Limits {
         let unless_latched = |ns: u64| self.latch.action().is_none().then_some(ns);
+        let action = self.process.choice.action;
+        let own_ns = self.process.actions.get(action).and_then(|m| m.epoch_ns);
         Limits {
-            epoch_ns: unless_latched(self.epoch_ns),
+            epoch_ns: unless_latched(own_ns.unwrap_or(self.epoch_ns)),
             running_ns: unless_latched(self.action_ns),
-            has_end: has_end(self.process.kind(self.process.choice.action)),
+            has_end: self.has_end(action),
         }
     }
 
@@ -166,22 +179,8 @@ impl SymptomDecision {
         follow.unwrap_or(action)
     }
 
-    /// What the end of an action says about the unknown.
-    fn remember(&mut self, set: u32, end: End) {
-        let kind = self.process.kind(self.process.choice.action);
-        let Some(hardware) = &mut self.hardware else {
-            return;
-        };
-        match kind {
-            RecoveryKind::Relocalise if end != End::Unfinished => hardware.sought(),
-            RecoveryKind::GoOn if set == 0 => hardware.quiet(),
-            _ => {}
-        }
-    }
-
     /// One step of the model.
     fn track(&mut self, set: u32, end: End) {
-        self.remember(set, end);
         let action = self.step_action(end);
         let process = &mut self.process;
         let evidence = match self.observations.index(set) {
@@ -193,15 +192,7 @@ impl SymptomDecision {
             }
         };
         process.log_evidence = process.log_probability(evidence).unwrap_or(0.0);
-        let Some(hardware) = &mut self.hardware else {
-            return;
-        };
-        hardware.take(&mut process.scratch);
-        let soft = process.tracker.weigh(&process.scratch);
-        process.log_evidence += process.log_probability(soft).unwrap_or(0.0);
-        if hardware.has_drifted(process.tracker.belief()) {
-            self.anchor();
-        }
+        self.take_over(0.0);
     }
 
     fn begin_run(&mut self, run_id: u64) {
@@ -221,17 +212,12 @@ impl SymptomDecision {
 
     fn choose(&mut self) {
         let process = &mut self.process;
-        let belief = process.tracker.belief();
-        let mut best = process.decider.decide(belief).choice();
-        if let Some(hardware) = &self.hardware
-            && !hardware.allows(best.action)
-        {
-            let values = process.worth.values(&process.decider, belief);
-            best = choose_among(values, |action| hardware.allows(action));
-        }
+        let best = process.decider.decide(process.tracker.belief()).choice();
         let actions = &process.actions;
         let kind = |action: usize| actions.get(action).map_or(RecoveryKind::Stop, |m| m.kind);
-        process.choice = self.latch.choose(best, kind);
+        let before = std::mem::replace(&mut process.choice, self.latch.choose(best, kind)).action;
+        let action = process.choice.action;
+        self.wheels.choose(process.kind(action), action == before);
     }
 
     /// Opens a new decision, whose outcome is waited for.
@@ -242,7 +228,7 @@ impl SymptomDecision {
 }
 
 impl DecisionRule for SymptomDecision {
-    fn take(&mut self, inputs: Inputs<'_>, _: Situation) {
+    fn take(&mut self, inputs: Inputs<'_>, situation: Situation) {
         let hardware = self.hardware.as_ref();
         let is_sound = |d: &&FaultBelief| hardware.is_none_or(|h| h.is_sound(d));
         let diagnosis = inputs.diagnosis.filter(is_sound);
@@ -252,13 +238,13 @@ impl DecisionRule for SymptomDecision {
             self.miss(1);
         }
         if let Some(diagnosis) = diagnosis {
-            let was_lost = self.process.losses.diagnosis_alone();
-            self.take_diagnosis(diagnosis, was_lost);
+            self.process.losses.diagnosis_alone();
+            self.take_diagnosis(diagnosis, situation);
         }
         match inputs.detection {
             Some(detection) => {
                 self.process.losses.detection();
-                self.take_detection(detection);
+                self.take_detection(detection, situation);
             }
             // A diagnosis holds no symptoms, and does not make up for missing ones.
             None if !refuses && self.process.losses.no_detection() => self.enter_safe_mode(),
@@ -285,8 +271,9 @@ impl DecisionRule for SymptomDecision {
     fn reset(&mut self) {
         self.process.reset();
         if let Some(hardware) = &mut self.hardware {
-            hardware.reset();
+            hardware.forget();
         }
+        self.wheels.forget();
         self.epoch.reset();
         self.latch.release();
         self.choose();
@@ -303,7 +290,7 @@ impl DecisionRule for SymptomDecision {
             _ => Instruction {
                 action: self.process.choice.action,
                 kind: self.process.kind(self.process.choice.action),
-                wheel: None,
+                wheel: self.wheels.about(),
             },
         };
         // The stop of the safe mode, and its end, are decisions of their own.
@@ -313,16 +300,6 @@ impl DecisionRule for SymptomDecision {
             self.open_decision();
         }
         self.process.write(instruction, action);
-    }
-}
-
-/// True for what a robot does and then has done.
-const fn has_end(kind: RecoveryKind) -> bool {
-    use RecoveryKind as R;
-    match kind {
-        R::NewPath | R::Relocalise | R::GoThrough | R::MoveAway | R::CallForHelp | R::GiveUp => {
-            true
-        }
-        R::None | R::GoOn | R::SlowDown | R::Stop | R::Compensate | R::IgnoreEncoder => false,
+        self.wheels.write(instruction.kind, action);
     }
 }

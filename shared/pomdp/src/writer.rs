@@ -79,63 +79,123 @@ impl Pomdp {
         put(text, format_args!("{line}\n"));
     }
 
-    /// Rows of T or O, for every action at once where all have the same.
+    /// Rows of T or O. What most actions share is written for all of them, and then the rows of
+    /// those that differ.
     fn write_rows(
         &self,
         text: &mut String,
         table: &str,
         row: impl Fn(usize, usize) -> Vec<(usize, f64)>,
     ) {
-        let (n, is_square) = (self.states().len(), table == "T");
-        let width = if is_square {
-            n
-        } else {
-            self.observations().len()
+        let columns = match table {
+            "T" => self.states(),
+            _ => self.observations(),
         };
-        let columns = if is_square {
-            self.states()
-        } else {
-            self.observations()
+        let write = RowWriter {
+            table,
+            states: self.states(),
+            columns,
         };
-        let same = |state| (1..self.actions().len()).all(|a| row(a, state) == row(0, state));
-        let uniform = |row: &[(usize, f64)]| {
-            row.len() == width && row.iter().all(|(_, p)| *p == 1.0 / width as f64)
+        let of_state = |state| {
+            let rows = (0..self.actions().len()).map(|action| row(action, state));
+            rows.collect::<Vec<_>>()
         };
-        let is_identity =
-            |state: usize, row: &[(usize, f64)]| is_square && width > 1 && *row == [(state, 1.0)];
-        let is_uniform = |row: &[(usize, f64)]| width > 1 && uniform(row);
-        // The rows of one action; `*` stands for all.
-        let mut write_action = |action: &str, a: usize, states: &[usize]| {
-            let rows: Vec<_> = states.iter().map(|&state| (state, row(a, state))).collect();
-            let is_whole = rows.len() == n;
-            if is_whole && rows.iter().all(|(state, row)| is_identity(*state, row)) {
-                put(text, format_args!("{table}: {action} identity"));
-                return;
-            }
-            if is_whole && rows.iter().all(|(_, row)| is_uniform(row)) {
-                put(text, format_args!("{table}: {action} uniform"));
-                return;
-            }
-            for (state, row) in rows {
-                let name = &self.states()[state];
-                if is_uniform(&row) {
-                    put(text, format_args!("{table}: {action} : {name} uniform"));
-                    continue;
-                }
-                for (column, p) in row {
-                    let (to, p) = (&columns[column], Number(p));
-                    put(text, format_args!("{table}: {action} : {name} : {to} {p}"));
-                }
-            }
-        };
-        let (shared, own): (Vec<usize>, Vec<usize>) = (0..n).partition(|&state| same(state));
-        write_action("*", 0, &shared);
-        if !own.is_empty() {
-            for (a, action) in self.actions().iter().enumerate() {
-                write_action(action, a, &own);
-            }
+        let rows: Vec<Vec<Row>> = (0..self.states().len()).map(of_state).collect();
+        let shared: Vec<Option<&Row>> = rows.iter().map(|rows| most_frequent(rows)).collect();
+        write.action(text, "*", &shared, &vec![None; shared.len()]);
+        for (a, action) in self.actions().iter().enumerate() {
+            let differs = |(rows, shared): (&'_ Vec<Row>, &Option<&Row>)| *shared != Some(&rows[a]);
+            let own: Vec<Option<&Row>> = rows
+                .iter()
+                .zip(&shared)
+                .map(|both| differs(both).then_some(&both.0[a]))
+                .collect();
+            write.action(text, action, &own, &shared);
         }
         text.push('\n');
+    }
+}
+
+/// Columns and what they hold, without zeros.
+type Row = Vec<(usize, f64)>;
+
+/// The row that most of an action's rows are, if that is more than one of several.
+fn most_frequent(rows: &[Row]) -> Option<&Row> {
+    let count = |row: &Row| rows.iter().filter(|other| *other == row).count();
+    let numbered = rows.iter().enumerate();
+    let (_, most) = numbered.max_by_key(|(at, row)| (count(row), rows.len() - at))?;
+    (rows.len() == 1 || count(most) > 1).then_some(most)
+}
+
+/// Writes rows of T or O.
+struct RowWriter<'a> {
+    table: &'a str,
+    states: &'a [String],
+    columns: &'a [String],
+}
+
+impl RowWriter<'_> {
+    /// The rows of one action that there are; `*` stands for all. `before` are those that stand in
+    /// the text already.
+    fn action(
+        &self,
+        text: &mut String,
+        action: &str,
+        rows: &[Option<&Row>],
+        before: &[Option<&Row>],
+    ) {
+        let table = self.table;
+        let whole: Option<Vec<&Row>> = rows.iter().copied().collect();
+        let is_whole = |is: &dyn Fn(usize, &Row) -> bool| {
+            let is = |(state, row): (usize, &&Row)| is(state, row);
+            whole
+                .as_ref()
+                .is_some_and(|rows| rows.iter().enumerate().all(is))
+        };
+        if is_whole(&|state, row| self.is_identity(state, row)) {
+            return put(text, format_args!("{table}: {action} identity"));
+        }
+        if is_whole(&|_, row| self.is_uniform(row)) {
+            return put(text, format_args!("{table}: {action} uniform"));
+        }
+        for (state, (row, before)) in rows.iter().zip(before).enumerate() {
+            if let Some(row) = row {
+                let head = format!("{table}: {action} : {}", self.states[state]);
+                self.row(text, &head, row, *before);
+            }
+        }
+    }
+
+    fn row(&self, text: &mut String, head: &str, row: &Row, before: Option<&Row>) {
+        if self.is_uniform(row) {
+            return put(text, format_args!("{head} uniform"));
+        }
+        let at = |column: usize| {
+            row.iter()
+                .find(|(to, _)| *to == column)
+                .map_or(0.0, |(_, p)| *p)
+        };
+        let keeps_some = |(to, _): &(usize, f64)| at(*to) == 0.0;
+        if before.is_some_and(|before| before.iter().any(keeps_some)) {
+            let numbers = (0..self.columns.len()).map(|column| Number(at(column)).to_string());
+            let numbers: Vec<String> = numbers.collect();
+            return put(text, format_args!("{head}\n{}", numbers.join(" ")));
+        }
+        for (column, p) in row {
+            put(
+                text,
+                format_args!("{head} : {} {}", self.columns[*column], Number(*p)),
+            );
+        }
+    }
+
+    fn is_uniform(&self, row: &Row) -> bool {
+        let width = self.columns.len();
+        width > 1 && row.len() == width && row.iter().all(|(_, p)| *p == 1.0 / width as f64)
+    }
+
+    fn is_identity(&self, state: usize, row: &Row) -> bool {
+        self.table == "T" && self.columns.len() > 1 && *row == [(state, 1.0)]
     }
 }
 

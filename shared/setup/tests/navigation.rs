@@ -3,7 +3,7 @@
 mod shipped;
 
 use shipped::load;
-use vigil_decision::Evidence;
+use vigil_decision::{Counts, Evidence, OwnSymptom};
 use vigil_diagnosis::detect::MonitorSettings;
 use vigil_setup::graph_file::{GraphFile, Source};
 
@@ -91,7 +91,7 @@ fn evidence_and_actions_that_nothing_gives_are_refused() {
     let message = load(name, |file| file.monitors = None).unwrap_err();
     assert!(message.contains("supervisor.evidence: ") && message.contains("[monitors]"));
     let message = load(name, |file| file.supervisor.evidence = Evidence::Faults).unwrap_err();
-    assert!(message.contains("supervisor.hardware_state: "), "{message}");
+    assert!(message.contains("supervisor.lost_state: "), "{message}");
     let message = load(name, |file| file.navigation = None).unwrap_err();
     assert!(message.contains("drive: ") && message.contains("supervisor.actions.NP.kind: "));
     // A robot outside reports symptoms of its own and finds its own paths.
@@ -132,6 +132,31 @@ fn epochs_fit_what_a_robot_does_in_them() {
     // Waiting for help has no limit.
     let waits = |file: &mut GraphFile| file.navigation.as_mut().unwrap().help_s = 600.0;
     assert_eq!(load(name, waits), Ok(()));
-    let message = load(name, |file| file.supervisor.hardware_state = None).unwrap_err();
-    assert!(message.contains("supervisor.lost_state: "), "{message}");
+}
+
+#[test]
+fn symptoms_of_ones_own_have_names_and_bits_of_their_own() {
+    let refused = |name: &'static str, bit| {
+        let own = |bit| OwnSymptom {
+            bit,
+            counts: Counts::Rising,
+        };
+        let change = |file: &mut GraphFile| {
+            let symptoms = &mut file.supervisor.symptoms;
+            symptoms.insert("DOOR".to_owned(), own(8));
+            symptoms.insert(name.to_owned(), own(bit));
+        };
+        load("corridor-people.toml", change).unwrap_err()
+    };
+    for (name, bit, part) in [
+        ("EPM", 9, "EPM: is no name for a symptom"),
+        ("none", 9, "none: is no name for a symptom"),
+        ("BACK_DOOR", 9, "BACK_DOOR: is no name for a symptom"),
+        ("WINDOW", 8, "WINDOW: has the bit 8 of 'DOOR'"),
+        ("WINDOW", 7, "supervisor.symptoms.WINDOW.bit"),
+        ("WINDOW", 32, "supervisor.symptoms.WINDOW.bit"),
+    ] {
+        let message = refused(name, bit);
+        assert!(message.contains(part), "{part}: {message}");
+    }
 }

@@ -225,7 +225,8 @@ fn order(action: &Action) -> RobotOrder {
         | RecoveryKind::NewPath
         | RecoveryKind::Relocalise
         | RecoveryKind::GoThrough
-        | RecoveryKind::MoveAway => RobotOrder::Other,
+        | RecoveryKind::MoveAway
+        | RecoveryKind::Own => RobotOrder::Other,
     }
 }
 

@@ -1,7 +1,8 @@
 //! Missions of a decision model: [`simulation`] flies them and compares policies, [`learning`]
-//! finds the model's probabilities from recorded ones, [`navigation`] writes the paper's model, and
-//! [`recovery`] that of what to do about faults.
+//! finds the model's probabilities from recorded ones. Models are written by [`navigation`] (the
+//! paper's), [`exceptions`] (of navigation and hardware) and [`recovery`] (of faults).
 
+pub mod exceptions;
 pub mod learning;
 mod model_text;
 pub mod navigation;

@@ -18,6 +18,7 @@ STANDING = (
     vigil.RECOVERY_NEW_PATH,
     vigil.RECOVERY_RELOCALISE,
     vigil.RECOVERY_GIVE_UP,
+    vigil.RECOVERY_OWN,
 )
 # Reasons for which no action is obeyed, as Vigil's own rover has them (`ActionRejection`).
 NOTHING, EXPIRED, UNKNOWN_KIND = "nothing", "expired", "unknown-kind"

@@ -135,7 +135,9 @@ impl Navigator {
             self.outcome = ActionOutcome::Running;
             self.symptoms = 0;
             self.task = Task::begin(request.kind, [self.pose[0], self.pose[1]]);
-            if matches!(request.kind, RecoveryKind::Stop | RecoveryKind::GiveUp) {
+            // The simulated rover has no action of its own: it has done it by standing.
+            let is_done = [RecoveryKind::Stop, RecoveryKind::GiveUp, RecoveryKind::Own];
+            if is_done.contains(&request.kind) {
                 self.end(true);
             }
         }

@@ -33,7 +33,9 @@ impl Task {
     pub(super) const fn begin(kind: RecoveryKind, place: [f64; 2]) -> Self {
         let passed_s = 0.0;
         match kind {
-            RecoveryKind::None | RecoveryKind::Stop | RecoveryKind::GiveUp => Self::Stand,
+            RecoveryKind::None | RecoveryKind::Stop | RecoveryKind::GiveUp | RecoveryKind::Own => {
+                Self::Stand
+            }
             RecoveryKind::GoOn
             | RecoveryKind::SlowDown
             | RecoveryKind::Compensate

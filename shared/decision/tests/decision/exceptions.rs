@@ -3,7 +3,7 @@
 use vigil_blocks::{ActionOutcome, Entry, RecoveryKind, Symptoms};
 use vigil_cycle::allocation::allocations;
 use vigil_decision::Inputs;
-use vigil_decision::Settings;
+use vigil_decision::{Counts, OwnSymptom, Settings};
 use vigil_pomdp::{Pomdp, Tracker};
 
 use crate::navigation::{CYCLE_NS, FP, MODEL, Navigation, assert_near, build, settings, tracked};
@@ -83,14 +83,15 @@ fn an_impossible_set_is_counted_and_the_belief_restored() {
 
 #[test]
 fn a_task_given_up_stays_given_up_until_a_reset() {
-    let mut robot =
-        Navigation::with_model(&MODEL.replace("R: SH : * : * : * -10", "R: SH : * : * : * -900"));
+    let model = MODEL.replace("R: SH : * : * : * -10", "R: SH : * : * : * -900");
+    let mut robot = Navigation::with(&model, &settings());
     robot.rest(1.0, 0);
-    robot.identify(0.99, 0.9);
-    robot.cycle(0);
+    robot.cycle(Symptoms::EPS | Symptoms::SD);
+    while robot.kind() != RecoveryKind::GiveUp && robot.action.decision_seq < 20 {
+        robot.ended(ActionOutcome::Failed, Symptoms::EPS | Symptoms::SD);
+    }
     assert_eq!(robot.kind(), RecoveryKind::GiveUp);
-    assert!(robot.hp() > 0.9);
-    (robot.diagnosis.identifying, robot.diagnosis.p[0]) = (0, 1.0);
+    assert!(robot.p("HP") > 0.5, "{}", robot.p("HP"));
     robot.ended(ActionOutcome::Succeeded, 0);
     robot.rest(60.0, 0);
     assert_eq!(robot.kind(), RecoveryKind::GiveUp);
@@ -134,10 +135,11 @@ fn a_symptom_while_an_action_runs_is_a_step_of_following_and_does_not_begin_it_a
 #[test]
 fn what_the_robot_says_it_could_not_do_mends_nothing() {
     let lost = |outcome: ActionOutcome| {
-        let mut robot = Navigation::new();
+        let mut robot = Navigation::joint();
         robot.rest(1.0, 0);
         // The pose jumps: something that no fault of the tree explains.
-        robot.unknown(0.99, 0.9);
+        robot.detection.alarm = 1;
+        robot.unknown(0.99);
         robot.cycle(0);
         assert_eq!(robot.kind(), RecoveryKind::Relocalise);
         // The identifier has no more to say.
@@ -148,10 +150,10 @@ fn what_the_robot_says_it_could_not_do_mends_nothing() {
             RecoveryKind::Relocalise,
             "what jumped has jumped"
         );
-        let before = robot.lst();
+        let before = robot.p("LST");
         assert!(before > 0.9);
         robot.ended(outcome, Symptoms::EPS);
-        (before, robot.lst())
+        (before, robot.p("LST"))
     };
     let (before, after) = lost(ActionOutcome::Failed);
     assert!(after > 0.95 * before, "{before} {after}");
@@ -218,17 +220,22 @@ fn what_does_not_fit_is_named() {
     assert!(foreign.contains("observation 'EPM_XX'") && foreign.contains("joined by '_'"));
     let lacking = message(&MODEL.replace("none", "LD_EPM_SD_EPS"), |_| {});
     assert!(lacking.contains("no observation 'none'"), "{lacking}");
-    let state = message(MODEL, |s| s.hardware_state = Some("HW".into()));
-    assert!(state.contains("hardware_state: ") && state.contains("no state 'HW'"));
     let lost = message(MODEL, |s| s.lost_state = Some("LOST".into()));
     assert!(lost.contains("lost_state: ") && lost.contains("NOM, NNP, HP, RT, PP, WD, LST"));
+    let own = message(MODEL, |s| {
+        let bit = |bit| OwnSymptom {
+            bit,
+            counts: Counts::Rising,
+        };
+        s.symptoms.insert("DOOR".into(), bit(9));
+    });
+    assert!(own.contains("[supervisor.symptoms] names 'DOOR'"), "{own}");
     assert!(message(MODEL, |s| s.actions.retain(|a, _| a != "MA")).contains("action 'MA'"));
     let twice = "discount: 0.9\nstates: 2\nactions: 1\nobservations: none EPM_LD LD_EPM\n\
                  T: * identity\nO: * uniform\n";
     let same = message(twice, |s| {
         s.actions.retain(|_, _| false);
         s.actions.insert("0".into(), settings_stop());
-        (s.hardware_state, s.lost_state) = (None, None);
     });
     assert!(same.contains("'LD_EPM' and 'EPM_LD'"), "{same}");
 }
@@ -237,20 +244,81 @@ fn settings_stop() -> vigil_decision::RecoveryAction {
     vigil_decision::RecoveryAction {
         kind: vigil_decision::Recovery::Stop,
         speed_scale: None,
+        has_end: None,
+        epoch_ms: None,
     }
+}
+
+/// A robot with a monitor of its battery and an action of its own against it.
+const DOCKING: &str = "\
+discount: 0.9
+values: reward
+states: NOM EMPTY
+actions: FP DOCK
+observations: none BATTERY DOCKED BATTERY_DOCKED
+start: 0.99 0.01
+T: FP
+0.99 0.01
+0 1
+T: DOCK
+1 0
+1 0
+O: FP
+0.99 0.01 0 0
+0.1 0.9 0 0
+O: DOCK
+0.05 0 0.95 0
+0.05 0 0.95 0
+R: FP : NOM : * : * 1
+R: FP : EMPTY : * : * -5
+R: DOCK : * : * : * -1
+";
+
+#[test]
+fn a_symptom_an_outcome_and_an_action_of_ones_own_need_no_code() {
+    let (battery, docked) = (1 << 8, 1 << 31);
+    let declared = "
+        evidence = 'symptoms'
+        epoch_ms = 5000.0
+        [symptoms]
+        BATTERY = { bit = 8, counts = 'standing' }
+        DOCKED = { bit = 31, counts = 'outcome' }
+        [actions]
+        FP = { kind = 'go_on' }
+        DOCK = { kind = 'own' }
+    ";
+    let mut robot = Navigation::with(DOCKING, &toml::from_str(declared).unwrap());
+    robot.rest(6.0, Symptoms::EPM);
+    assert_eq!(
+        robot.kind(),
+        RecoveryKind::GoOn,
+        "a symptom that the model does not know"
+    );
+    robot.cycle(battery);
+    assert_eq!((robot.kind(), robot.action.action), (RecoveryKind::Own, 1));
+    assert_eq!(robot.action.speed_scale, 0.0);
+    assert!(robot.p("EMPTY") > 0.4);
+    (robot.detection.action_seq, robot.detection.action_outcome) =
+        (robot.action.decision_seq, ActionOutcome::Running as u32);
+    robot.rest(30.0, battery);
+    assert_eq!(robot.kind(), RecoveryKind::Own, "it runs");
+    robot.ended(ActionOutcome::Succeeded, docked);
+    assert_eq!(robot.kind(), RecoveryKind::GoOn);
+    assert_eq!(robot.action.impossible_count, 0);
 }
 
 #[test]
 fn a_steady_cycle_allocates_nothing_and_no_number_goes_bad() {
-    let mut robot = Navigation::new();
+    let mut robot = Navigation::joint();
     let before = allocations();
     for i in 0..20_000_u32 {
-        robot.identify(f64::from(i % 11) / 10.0, f64::from(i % 7) / 6.0);
-        robot.diagnosis.mode_change_count = i / 700;
+        let (p, unknown) = (f64::from(i % 11) / 20.0, f64::from(i % 7) / 12.0);
+        robot.diagnosis.p[0] = 1.0 - p - unknown;
+        (robot.diagnosis.p[12], robot.diagnosis.p_unknown) = (p, unknown);
         robot.detection.action_seq = robot.action.decision_seq;
         robot.detection.action_outcome = i / 50 % 4;
         robot.cycle(i / 30 % 128);
-        let belief = &robot.action.belief[..7];
+        let belief = &robot.action.belief;
         assert!((belief.iter().sum::<f64>() - 1.0).abs() < 1e-9);
         assert!(belief.iter().all(|b| b.is_finite() && *b >= 0.0));
         assert!(robot.action.log_evidence.is_finite() && robot.action.margin.is_finite());

@@ -1,71 +1,88 @@
-//! The navigation model behind the supervisor: what identifier and detector say about hardware.
+//! Navigation and hardware in one model: what identifier and detector say about hardware.
 
-use vigil_blocks::{ActionOutcome, ControlMode, Entry, RecoveryKind, Symptoms};
+use vigil_blocks::{ActionOutcome, ControlMode, Entry, Readiness, RecoveryKind, Symptoms};
 use vigil_decision::Inputs;
-use vigil_pomdp::{Pomdp, Tracker};
 
-use crate::navigation::{CYCLE_NS, FP, MODEL, Navigation, assert_near, build, settings, tracked};
+use crate::navigation::{CYCLE_NS, JOINT, Navigation, build, joint_settings};
 
 #[test]
-fn the_identifiers_evidence_counts_once() {
-    let mut robot = Navigation::new();
+fn a_stuck_wheel_is_steered_against_also_through_an_opening() {
+    let mut robot = Navigation::joint();
     robot.rest(1.0, 0);
-    robot.identify(0.5, 0.5);
+    robot.identify("RM_STUCK", 0.95);
     robot.cycle(0);
-    assert!(
-        (robot.hp() - 0.5).abs() < 1e-9,
-        "it begins to identify: taken over"
+    assert_eq!(robot.kind(), RecoveryKind::Compensate);
+    assert_eq!(
+        (robot.action.wheel, robot.action.curvature_offset),
+        (4, 0.4)
     );
-    let believed = robot.action.belief;
-    // Data 3 to 1 in favour of a fault in one cycle, then a posterior that no data changes.
-    robot.identify(0.75, 0.5);
+    assert!((robot.p("STUCK") - 0.95).abs() < 1e-9);
+    let asked = robot.action.decision_seq;
+    robot.rest(20.0, 0);
+    assert_eq!(robot.action.decision_seq, asked, "what goes on, goes on");
+    // Something is in the way besides.
+    robot.cycle(Symptoms::EPM);
+    assert_eq!(robot.kind(), RecoveryKind::GoThrough);
+    assert_eq!(
+        (robot.action.wheel, robot.action.curvature_offset),
+        (4, 0.4)
+    );
+    assert!(
+        (robot.p("STUCK") - 0.95).abs() < 1e-9,
+        "the identifier knows"
+    );
+    let blocked = robot.p("NNP") + robot.p("RT") + robot.p("PP");
+    assert!(blocked > 0.8, "{blocked}");
+    robot.ended(ActionOutcome::Succeeded, Symptoms::BO);
+    assert_eq!(robot.kind(), RecoveryKind::Compensate);
+    // Another wheel after all.
+    robot.identify("LF_STUCK", 0.95);
     robot.cycle(0);
-    robot.identify(0.75, 0.75);
-    robot.rest(5.0, 0);
-    assert_eq!(robot.action.belief, believed, "the epoch has not ended");
-    robot.cycle(Symptoms::EPS);
-    let model = Pomdp::parse(MODEL).unwrap();
-    let mut tracker = Tracker::new(&model);
-    tracker.anchor(&believed[..7]);
-    let eps = model.observations().iter().position(|z| z == "EPS");
-    // What is done about it is not done yet: a step of following.
-    tracker.update(&model, FP, eps.unwrap());
-    tracker.weigh(&[1.0, 1.0, 3.0, 1.0, 1.0, 1.0, 1.0]);
-    assert!(
-        tracker.belief()[2] > 0.7,
-        "not so far below the identifier's as to be taken over"
+    assert_eq!(
+        (robot.action.wheel, robot.action.curvature_offset),
+        (0, 0.0)
     );
-    assert_near(&robot, tracker.belief());
 }
 
 #[test]
-fn hardware_is_called_help_for_at_once_and_the_call_stands_until_a_new_run() {
-    let mut robot = Navigation::new();
+fn a_broken_encoder_is_ignored_and_mended_ones_are_forgotten() {
+    let mut robot = Navigation::joint();
     robot.rest(1.0, 0);
-    robot.identify(0.99, 0.9);
+    robot.identify("LM_ENC", 0.97);
     robot.cycle(0);
+    assert_eq!(
+        (robot.kind(), robot.action.wheel),
+        (RecoveryKind::IgnoreEncoder, 1)
+    );
+    robot.nothing();
+    robot.rest(1.0, 0);
+    assert_eq!(
+        (robot.kind(), robot.action.wheel),
+        (RecoveryKind::GoOn, u32::MAX)
+    );
+    assert!(robot.p("ENCODER") < 1e-3);
+}
+
+#[test]
+fn two_faults_are_called_help_for_and_the_call_stands_until_a_new_run() {
+    let mut robot = Navigation::joint();
+    robot.rest(1.0, 0);
+    robot.identify("RM_STUCK", 0.99);
+    robot.diagnosis.p[8] = 0.99;
+    robot.diagnosis.set_count = 1;
+    let set = &mut robot.diagnosis.sets[0];
+    (set.leaves, set.p) = (1 << 12 | 1 << 8, 0.99);
+    robot.rest(12.0, 0);
     assert_eq!(robot.kind(), RecoveryKind::CallForHelp);
-    assert!((robot.hp() - 0.99).abs() < 1e-9);
+    assert!((robot.p("SEVERAL") - 0.99).abs() < 1e-6);
     let called = robot.action.decision_seq;
-    // Help takes its time, and waiting for it mends nothing.
-    robot.identify(0.99, 0.99);
+    // Help takes its time, and a robot that stands looks healthy.
     (robot.detection.action_seq, robot.detection.action_outcome) =
         (called, ActionOutcome::Running as u32);
-    robot.rest(100.0, 0);
-    assert!(robot.hp() > 0.98, "{}", robot.hp());
-    // It has come; the model expects it to mend nine times in ten; the identifier still sees it.
-    robot.ended(ActionOutcome::Succeeded, 0);
-    assert!(robot.hp() > 0.94);
-    // It returns to watching: a robot that stands looks healthy.
-    (robot.diagnosis.identifying, robot.diagnosis.p[0]) = (0, 1.0);
-    robot.cycle(0);
-    assert!(robot.hp() < 0.01);
+    robot.nothing();
     robot.rest(100.0, Symptoms::EPS);
     assert_eq!(robot.kind(), RecoveryKind::CallForHelp);
-    assert_eq!(
-        (robot.action.decision_seq, robot.action.margin),
-        (called, 0.0)
-    );
+    assert_eq!(robot.action.decision_seq, called);
     // Whoever has helped begins a new run.
     (robot.diagnosis.run_id, robot.detection.run_id) = (1, 1);
     robot.cycle(0);
@@ -73,92 +90,64 @@ fn hardware_is_called_help_for_at_once_and_the_call_stands_until_a_new_run() {
 }
 
 #[test]
-fn what_is_unknown_is_a_fault_that_nobody_has_modelled_or_a_place_that_is_lost() {
+fn what_is_unknown_is_a_place_that_is_lost_or_a_fault_that_nobody_has_modelled() {
     // The place is looked for; if that does not explain it, help is called for.
-    let mut robot = Navigation::new();
+    let mut robot = Navigation::joint();
     robot.rest(1.0, 0);
-    robot.unknown(0.999, 0.9);
+    robot.detection.alarm = 1;
+    robot.unknown(0.999);
     robot.cycle(0);
     assert_eq!(robot.kind(), RecoveryKind::Relocalise);
-    assert!((robot.hp() + robot.lst() - 0.999).abs() < 1e-4);
-    assert!(
-        robot.lst() > robot.hp(),
-        "losing the way is the more frequent"
-    );
-    robot.unknown(0.999, 0.999);
+    let lost = robot.p("LST");
+    assert!(robot.p("NOM") < 1e-3);
+    assert!(lost > 0.5, "losing the way is the more frequent: {lost}");
+    // While it stands, nothing is seen of either.
+    robot.detection.readiness = Readiness::NotExcited as u32;
+    robot.nothing();
     robot.rest(1.0, 0);
     assert_eq!(robot.kind(), RecoveryKind::Relocalise);
     robot.ended(ActionOutcome::Succeeded, 0);
-    assert_eq!(robot.kind(), RecoveryKind::CallForHelp);
-    assert!(robot.hp() > 0.99, "{}", robot.hp());
-    // Where no state means a lost robot, it is the hardware's.
-    let mut alone = settings();
+    let unknown = robot.p("UNKNOWN") + robot.p("UNKNOWN_OLD");
+    assert!(unknown > robot.p("LST"), "{unknown}");
+    // Without a state of a lost robot it is the hardware's.
+    let mut alone = joint_settings();
     alone.lost_state = None;
-    let mut robot = Navigation::new();
-    robot.supervisor = build(MODEL, &alone).unwrap();
+    let mut robot = Navigation::joint();
+    robot.supervisor = build(JOINT, &alone).unwrap();
     robot.rest(1.0, 0);
-    robot.unknown(0.999, 0.9);
+    robot.detection.alarm = 1;
+    robot.unknown(0.999);
     robot.cycle(0);
+    assert!((robot.p("UNKNOWN") + robot.p("UNKNOWN_OLD") - 0.999).abs() < 1e-6);
+    robot.rest(31.0, 0);
     assert_eq!(robot.kind(), RecoveryKind::CallForHelp);
-    assert!((robot.hp() - 0.999).abs() < 1e-9);
 }
 
 #[test]
-fn what_comes_back_after_the_place_was_sought_is_hardware_until_it_was_quiet() {
-    for (seconds, kind) in [
-        (5.0, RecoveryKind::CallForHelp),
-        (40.0, RecoveryKind::Relocalise),
-    ] {
-        for outcome in [ActionOutcome::Succeeded, ActionOutcome::Failed] {
-            let mut robot = Navigation::new();
-            robot.unknown(0.999, 0.9);
-            robot.cycle(0);
-            assert_eq!(robot.kind(), RecoveryKind::Relocalise);
-            // A robot that stands looks healthy; when it drives on, there it is again.
-            robot.nothing();
-            robot.cycle(0);
-            robot.ended(outcome, 0);
-            if outcome == ActionOutcome::Failed {
-                robot.ended(ActionOutcome::Succeeded, 0);
+fn a_failed_new_path_is_not_asked_for_again_while_the_way_is_blocked() {
+    let mut robot = Navigation::joint();
+    robot.rest(1.0, 0);
+    robot.cycle(Symptoms::EPM);
+    let mut asked = 0;
+    let mut kinds = Vec::new();
+    while robot.kind() != RecoveryKind::CallForHelp && kinds.len() < 20 {
+        kinds.push(robot.kind());
+        let outcome = match robot.kind() {
+            RecoveryKind::NewPath => {
+                asked += 1;
+                Symptoms::NNA
             }
-            assert_eq!(robot.kind(), RecoveryKind::GoOn);
-            robot.rest(seconds, 0);
-            robot.unknown(0.999, 0.9);
-            robot.cycle(0);
-            assert_eq!(robot.kind(), kind, "{seconds} {outcome:?}");
-        }
+            _ => 0,
+        };
+        robot.ended(ActionOutcome::Failed, Symptoms::EPS | outcome);
     }
-}
-
-#[test]
-fn while_something_is_wrong_only_what_may_mend_it_is_done() {
-    // The path is blocked, and nobody knows what is wrong with the robot besides.
-    for policy in ["qmdp", "mls", "av", "fib"] {
-        let mut settings = settings();
-        settings.policy = policy.into();
-        let mut robot = Navigation::new();
-        robot.supervisor = build(MODEL, &settings).unwrap();
-        robot.rest(1.0, 0);
-        robot.cycle(Symptoms::EPM);
-        assert_eq!(robot.kind(), RecoveryKind::GoThrough, "{policy}");
-        robot.unknown(0.7, 0.69);
-        for _ in 0..6 {
-            robot.cycle(Symptoms::EPM);
-            let mends = [RecoveryKind::Relocalise, RecoveryKind::CallForHelp];
-            assert!(
-                mends.contains(&robot.kind()),
-                "{policy}: {:?}",
-                robot.kind()
-            );
-            robot.ended(ActionOutcome::Succeeded, Symptoms::EPM);
-        }
-        assert_eq!(robot.kind(), RecoveryKind::CallForHelp, "{policy}");
-    }
+    assert_eq!(asked, 1, "{kinds:?}");
+    assert_eq!(robot.kind(), RecoveryKind::CallForHelp, "{kinds:?}");
 }
 
 #[test]
 fn without_the_identifier_the_detectors_alarm_is_heard() {
-    let mut robot = Navigation::new();
+    let mut robot = Navigation::joint();
     robot.rest(1.0, 0);
     robot.detection.p_fault = 0.3;
     let cycle = |robot: &mut Navigation| {
@@ -177,36 +166,34 @@ fn without_the_identifier_the_detectors_alarm_is_heard() {
     assert_eq!(robot.kind(), RecoveryKind::GoOn, "no alarm");
     (robot.detection.alarm, robot.detection.p_fault) = (1, 0.99);
     cycle(&mut robot);
-    assert_eq!(robot.kind(), RecoveryKind::Relocalise);
-    assert!((robot.hp() + robot.lst() - 0.99).abs() < 1e-3);
+    assert_ne!(robot.kind(), RecoveryKind::GoOn);
+    let wrong = 1.0 - robot.p("NOM");
+    assert!(wrong > 0.9, "{wrong}");
     let believed = robot.action.belief;
     let bad = robot.action.impossible_count;
     robot.detection.p_fault = f64::NAN;
     cycle(&mut robot);
     assert_eq!(robot.action.belief, believed);
     assert_eq!(robot.action.impossible_count, bad + 1);
-    // What was hardware stays hardware.
-    let mut robot = Navigation::new();
-    robot.identify(0.99, 0.9);
+    // What was a stuck wheel stays one.
+    let mut robot = Navigation::joint();
+    robot.identify("RM_STUCK", 0.99);
     robot.rest(1.0, 0);
     (robot.detection.alarm, robot.detection.p_fault) = (1, 0.99);
     (0..20).for_each(|_| cycle(&mut robot));
-    assert!(robot.hp() > 0.94, "{}", robot.hp());
+    assert!(robot.p("STUCK") > 0.98, "{}", robot.p("STUCK"));
+    assert_eq!(robot.kind(), RecoveryKind::Compensate);
 }
 
 #[test]
-fn a_watching_identifier_says_nothing_and_one_of_another_tree_is_refused() {
-    let mut robot = Navigation::new();
-    robot.diagnosis.p[0] = 0.2;
-    robot.diagnosis.p_unknown = 0.8;
+fn an_identifier_of_another_tree_is_refused_and_symptoms_are_heard_all_the_same() {
+    let mut robot = Navigation::joint();
     robot.rest(20.0, 0);
-    assert_near(&robot, &tracked(&[(FP, "none")]));
     robot.diagnosis.tree_hash ^= 1;
     robot.rest(0.05, 0);
     assert_eq!(robot.action.impossible_count, 5);
     assert_eq!(robot.action.lost_stages, 1);
     assert_eq!(robot.action.control_mode, ControlMode::Fallback as u32);
-    // Symptoms are heard all the same.
     robot.cycle(Symptoms::EPM);
     assert_eq!(robot.kind(), RecoveryKind::GoThrough);
 }

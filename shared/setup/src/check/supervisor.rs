@@ -1,5 +1,6 @@
 //! Rules of `[supervisor]`.
 
+use vigil_blocks::Symptoms;
 use vigil_decision::{Evidence, Recovery, Settings};
 use vigil_pomdp::policy::PolicyKind;
 
@@ -14,17 +15,25 @@ pub(super) fn check(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
     let settings = &file.supervisor;
     policy(settings, report);
     let simulates = file.sensor.source == Source::Simulator;
-    if settings.evidence == Evidence::Faults && settings.hardware_state.is_some() {
+    if settings.evidence == Evidence::Faults {
         let message = "has a meaning only with supervisor.evidence = \"symptoms\"";
-        report("supervisor.hardware_state", message.to_owned());
+        let is_given = [
+            ("lost_state", settings.lost_state.is_some()),
+            ("symptoms", !settings.symptoms.is_empty()),
+        ];
+        for (key, _) in is_given.into_iter().filter(|(_, is_given)| *is_given) {
+            report(&format!("supervisor.{key}"), message.to_owned());
+        }
     }
-    if settings.lost_state.is_some() && settings.hardware_state.is_none() {
-        let message = "has a meaning only with supervisor.hardware_state";
-        report("supervisor.lost_state", message.to_owned());
-    }
-    if settings.lost_state.is_some() && settings.lost_state == settings.hardware_state {
-        let message = "must be another state than supervisor.hardware_state";
-        report("supervisor.lost_state", message.to_owned());
+    symptoms(settings, report);
+    for (name, action) in &settings.actions {
+        if settings.evidence == Evidence::Faults && action.epoch_ms.is_some() {
+            let message = "has a meaning only with supervisor.evidence = \"symptoms\"";
+            report(
+                &format!("supervisor.actions.{name}.epoch_ms"),
+                message.to_owned(),
+            );
+        }
     }
     if settings.evidence == Evidence::Symptoms {
         durations(file, report);
@@ -40,6 +49,27 @@ pub(super) fn check(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
                 let message = "the simulator can do this only with a path: [navigation]";
                 report(&key, message.to_owned());
             }
+        }
+    }
+}
+
+/// Symptoms of the user's own: names that sets can be written with, and bits of their own.
+fn symptoms(settings: &Settings, report: &mut impl FnMut(&str, String)) {
+    let is_letter = |c: char| c.is_ascii_alphanumeric();
+    for (name, own) in &settings.symptoms {
+        let key = format!("supervisor.symptoms.{name}");
+        let is_taken = name == "none" || Symptoms::NAMED.iter().any(|(taken, _)| taken == name);
+        if is_taken || !name.starts_with(is_letter) || !name.chars().all(is_letter) {
+            let message = "is no name for a symptom: allowed are letters and digits, and none of \
+                           none, EPS, EPM, LD, SD, BO, ALT, NNA";
+            report(&key, message.to_owned());
+        }
+        let same = settings
+            .symptoms
+            .iter()
+            .filter(|(_, other)| other.bit == own.bit);
+        if let Some((other, _)) = same.into_iter().find(|(other, _)| *other < name) {
+            report(&key, format!("has the bit {} of '{other}'", own.bit));
         }
     }
 }

@@ -378,6 +378,8 @@ fn supervisor(decision: &Pomdp, of: &OfflineModels) -> Result<Supervisor, Superv
         let action = RecoveryAction {
             kind: Recovery::deserialize(word).ok()?,
             speed_scale: None,
+            has_end: None,
+            epoch_ms: None,
         };
         Some((name.clone(), action))
     };

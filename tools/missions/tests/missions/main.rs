@@ -2,6 +2,7 @@
 
 #![cfg(test)]
 
+mod exceptions;
 mod heuristics;
 mod learning;
 mod learning_check;

@@ -83,6 +83,7 @@ fn constants() -> Vec<(&'static str, String, u64)> {
         ("GO_THROUGH", RecoveryKind::GoThrough),
         ("MOVE_AWAY", RecoveryKind::MoveAway),
         ("GIVE_UP", RecoveryKind::GiveUp),
+        ("OWN", RecoveryKind::Own),
     ];
     all.extend(kinds.map(|(name, value)| ("RECOVERY", name.to_owned(), value as u64)));
     let modes = [

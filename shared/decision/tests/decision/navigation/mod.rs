@@ -1,20 +1,35 @@
 //! The navigation model behind the supervisor, with symptoms and outcomes in each cycle.
 
 use vigil_blocks::{Action, ActionOutcome, DetectionBelief, Entry, FaultBelief, RecoveryKind};
-use vigil_decision::Settings;
-use vigil_decision::{Inputs, Supervisor};
+use vigil_decision::{Compensation, Inputs, Settings, Supervisor};
 use vigil_pomdp::{Pomdp, Tracker};
 use vigil_robot::FaultTree;
 use vigil_setup::graph_file::GraphFile;
 
 /// Time between cycles.
 pub const CYCLE_NS: u64 = 10_000_000;
-/// The shipped model.
+/// The paper's model.
 pub const MODEL: &str = include_str!("../../../../../config/navigation.pomdp");
+/// The shipped model of navigation and hardware.
+pub const JOINT: &str = include_str!("../../../../../config/corridor.pomdp");
 const GRAPH: &str = include_str!("../../../../../config/corridor-obstacle.toml");
 
+/// Q-MDP about the paper's model.
 pub fn settings() -> Settings {
-    toml::from_str::<GraphFile>(GRAPH).unwrap().supervisor
+    let mut settings = joint_settings();
+    settings.lost_state = None;
+    let paper = ["FP", "NP", "RL", "GO", "MA", "SH", "GU"];
+    settings
+        .actions
+        .retain(|name, _| paper.contains(&name.as_str()));
+    settings
+}
+
+/// As shipped, but by Q-MDP.
+pub fn joint_settings() -> Settings {
+    let mut settings = toml::from_str::<GraphFile>(GRAPH).unwrap().supervisor;
+    (settings.policy, settings.policy_file) = ("qmdp".to_owned(), None);
+    settings
 }
 
 pub fn tree() -> FaultTree {
@@ -26,7 +41,13 @@ pub fn build(model: &str, settings: &Settings) -> Result<Supervisor, String> {
     let config = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
     let robot = vigil_setup::load_robot(&config.join("robots/rover.toml")).unwrap();
     let model = Pomdp::parse(model).unwrap();
-    Supervisor::new(model, None, &tree(), &robot, settings, Vec::new(), 10)
+    let compensation = (0..6).map(|wheel| Compensation {
+        wheel,
+        curvature_gain: 1.0,
+        curvature_offset_1_m: 0.1 * wheel as f64,
+    });
+    let compensation = compensation.collect();
+    Supervisor::new(model, None, &tree(), &robot, settings, compensation, 10)
         .map_err(|e| e.to_string())
 }
 
@@ -36,21 +57,29 @@ pub struct Navigation {
     pub action: Action,
     pub detection: DetectionBelief,
     pub diagnosis: FaultBelief,
+    states: Vec<String>,
 }
 
 impl Navigation {
+    /// By the paper's model.
     pub fn new() -> Self {
-        Self::with_model(MODEL)
+        Self::with(MODEL, &settings())
     }
 
-    pub fn with_model(model: &str) -> Self {
+    /// By the shipped model of navigation and hardware.
+    pub fn joint() -> Self {
+        Self::with(JOINT, &joint_settings())
+    }
+
+    pub fn with(model: &str, settings: &Settings) -> Self {
         let mut diagnosis = FaultBelief {
             tree_hash: tree().hash(),
             ..FaultBelief::default()
         };
         (diagnosis.p[0], diagnosis.p_predicted[0]) = (1.0, 1.0);
         Self {
-            supervisor: build(model, &settings()).unwrap(),
+            supervisor: build(model, settings).unwrap(),
+            states: Pomdp::parse(model).unwrap().states().to_vec(),
             action: Action::default(),
             detection: DetectionBelief::default(),
             diagnosis,
@@ -80,36 +109,38 @@ impl Navigation {
         self.cycle(symptoms);
     }
 
-    /// The identifier's probability of a fault, and what it predicted.
-    pub fn identify(&mut self, p: f64, predicted: f64) {
+    /// The identifier's probability of this leaf, alone.
+    pub fn identify(&mut self, leaf: &str, p: f64) {
+        self.nothing();
         self.diagnosis.identifying = 1;
         self.diagnosis.p[0] = 1.0 - p;
-        self.diagnosis.p_predicted[0] = 1.0 - predicted;
+        self.diagnosis.p[tree().index(leaf).unwrap()] = p;
     }
 
     /// The same of something that no fault of the tree explains.
-    pub fn unknown(&mut self, p: f64, predicted: f64) {
-        self.identify(p, predicted);
-        self.diagnosis.p_unknown = p;
-        self.diagnosis.p_unknown_predicted = predicted;
+    pub fn unknown(&mut self, p: f64) {
+        self.nothing();
+        self.diagnosis.identifying = 1;
+        (self.diagnosis.p[0], self.diagnosis.p_unknown) = (1.0 - p, p);
     }
 
     /// It watches.
     pub fn nothing(&mut self) {
-        self.unknown(0.0, 0.0);
         self.diagnosis.identifying = 0;
+        self.diagnosis.p.fill(0.0);
+        (self.diagnosis.p[0], self.diagnosis.p_unknown) = (1.0, 0.0);
+        self.diagnosis.set_count = 0;
     }
 
     pub fn kind(&self) -> RecoveryKind {
         RecoveryKind::from_repr(self.action.kind).unwrap()
     }
 
-    pub fn hp(&self) -> f64 {
-        self.action.belief[2]
-    }
-
-    pub fn lst(&self) -> f64 {
-        self.action.belief[6]
+    /// Belief in the states with this exception.
+    pub fn p(&self, exception: &str) -> f64 {
+        let has = |name: &String| name.split('-').any(|part| part == exception);
+        let held = self.states.iter().zip(&self.action.belief);
+        held.filter(|(name, _)| has(name)).map(|(_, b)| b).sum()
     }
 }
 

@@ -1,5 +1,4 @@
-//! `vigil pomdp generate`: a model from its parameters, of navigation or of what to do about
-//! faults.
+//! `vigil pomdp generate`: a model from its parameters, of exceptions, of navigation or of faults.
 
 use std::fmt::Display;
 use std::fs;
@@ -7,17 +6,17 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use vigil_missions::{navigation, recovery};
+use vigil_missions::{exceptions, navigation, recovery};
 
 use super::save;
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
-/// Writes the model that follows from a file of parameters: of navigation, or of what to do about
-/// faults. The file's key `model` says which.
+/// Writes the model that follows from a file of parameters: of exceptions of navigation and hardware
+/// (`model = "exceptions"`), of the paper's navigation, or of what to do about faults.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Parameters, such as config/navigation.toml or config/rover.recovery.toml.
+    /// Parameters, such as config/corridor.recovery.toml or config/rover.recovery.toml.
     parameters: PathBuf,
     /// Where to write the model; standard output if it is not given.
     #[arg(long)]
@@ -33,6 +32,7 @@ struct Purpose {
 #[derive(Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Model {
+    Exceptions,
     Navigation,
     Recovery,
 }
@@ -45,6 +45,9 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let text = fs::read_to_string(&args.parameters)
         .map_err(|error| refused(args, &format!("cannot be read: {error}")))?;
     let model = match read::<Purpose>(args, &text)?.model {
+        Model::Exceptions => {
+            exceptions::generate(&read(args, &text)?).map_err(|error| refused(args, &error))?
+        }
         Model::Navigation => {
             navigation::generate(&read(args, &text)?).map_err(|error| refused(args, &error))?
         }

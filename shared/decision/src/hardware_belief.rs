@@ -1,0 +1,95 @@
+//! What is known of the hardware, for a model of navigation and hardware together.
+
+use vigil_blocks::{DECISION_STATES, DetectionBelief, FaultBelief};
+use vigil_pomdp::Pomdp;
+use vigil_robot::FaultTree;
+
+use crate::alarm_fusion::Situation;
+use crate::error::SupervisorError;
+use crate::joint_states::JointStates;
+use crate::state_belief::{self, normalise, write_fallback, write_weights};
+
+/// Probabilities of the hardware's states, as the identifier holds them.
+pub(crate) struct HardwareBelief {
+    states: JointStates,
+    tree_hash: u64,
+    /// Of no meaning unless `is_known`.
+    p: [f64; DECISION_STATES],
+    is_known: bool,
+}
+
+impl HardwareBelief {
+    /// `None` if no state of `model` says anything about the hardware.
+    ///
+    /// # Errors
+    /// As [`JointStates::new`].
+    pub(crate) fn new(
+        model: &Pomdp,
+        tree: &FaultTree,
+        lost: Option<&str>,
+    ) -> Result<Option<Self>, SupervisorError> {
+        let states = JointStates::new(model, tree, lost)?;
+        Ok(states.map(|states| Self {
+            states,
+            tree_hash: tree.hash(),
+            p: [0.0; DECISION_STATES],
+            is_known: false,
+        }))
+    }
+
+    /// True if a diagnosis speaks of this tree and holds probabilities.
+    pub(crate) fn is_sound(&self, diagnosis: &FaultBelief) -> bool {
+        state_belief::is_sound(diagnosis, &self.states.hardware, self.tree_hash)
+    }
+
+    /// Takes a sound diagnosis; `belief` is the predicted one over the model's states. A robot that
+    /// rests looks healthy: of that it is not believed.
+    pub(crate) fn take(&mut self, diagnosis: &FaultBelief, situation: Situation, belief: &[f64]) {
+        let mut predicted = [0.0; DECISION_STATES];
+        let count = self.states.hardware.len();
+        let predicted = &mut predicted[..count];
+        self.states.write_hardware(belief, predicted);
+        let p = &mut self.p[..count];
+        let hardware = &self.states.hardware;
+        write_weights(diagnosis, hardware, situation.alarm, predicted, p);
+        normalise(p);
+        self.is_known = !situation.rests || p[0] < predicted[0];
+    }
+
+    /// Takes what the detector says in the identifier's place.
+    pub(crate) fn take_alarm(
+        &mut self,
+        detection: &DetectionBelief,
+        situation: Situation,
+        belief: &[f64],
+    ) {
+        let mut predicted = [0.0; DECISION_STATES];
+        let count = self.states.hardware.len();
+        let predicted = &mut predicted[..count];
+        self.states.write_hardware(belief, predicted);
+        let p = &mut self.p[..count];
+        write_fallback(
+            detection,
+            &self.states.hardware,
+            situation.alarm,
+            predicted,
+            p,
+        );
+        self.is_known = !situation.rests || p[0] < predicted[0];
+    }
+
+    /// Writes `belief` with what is known of the hardware; as it is, if nothing is.
+    pub(crate) fn write_joint(&self, belief: &[f64], start: &[f64], joint: &mut [f64]) {
+        if self.is_known {
+            let p = &self.p[..self.states.hardware.len()];
+            self.states.take_over(p, belief, start, joint);
+        } else {
+            joint.copy_from_slice(belief);
+        }
+    }
+
+    /// Nothing is known.
+    pub(crate) const fn forget(&mut self) {
+        self.is_known = false;
+    }
+}
