@@ -45,7 +45,7 @@ pub(crate) fn contraction(discount: f64, mass_max: f64) -> Result<f64, SolveErro
     }
 }
 
-/// Q[a][.], one row per action.
+/// One vector q_a over the states for each action: `Q[a][s]`, in units of reward.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActionValues {
     states: usize,
