@@ -68,7 +68,7 @@ impl ActionValues {
         &self.values[action * self.states..][..self.states]
     }
 
-    /// max_a sum_s b(s) q_a(s).
+    /// max_a sum_s b(s) q_a(s); `belief` has one probability a state.
     #[must_use]
     pub fn value(&self, belief: &[f64]) -> f64 {
         self.rows()
