@@ -4,6 +4,9 @@
 #[path = "../shared/inference/tests/filters/cases/mod.rs"]
 #[allow(dead_code, unused_imports)] // Only two of the cases are used here.
 mod cases;
+#[path = "../shared/pomdp/examples/control_loop.rs"]
+#[allow(dead_code)] // Its `main`.
+mod control_loop;
 
 use std::path::Path;
 
@@ -152,4 +155,20 @@ fn no_belief_update_allocates() {
         assert_eq!(allocations() - before, 0);
         assert!(taken > 1000 && impossible > 10, "{taken}, {impossible}");
     }
+}
+
+#[test]
+fn the_control_loop_that_others_copy_allocates_nothing() {
+    let model = include_str!("../shared/pomdp/examples/gearbox.pomdp");
+    let policy = include_bytes!("../shared/pomdp/examples/gearbox.policy.json");
+    let mut controller = control_loop::Controller::new(model, policy).unwrap();
+    let mut inspected = 0;
+    let before = allocations();
+    assert!(before > 0, "the allocator does not count");
+    for step in 0..10_000 {
+        inspected += usize::from(controller.action() == "inspect");
+        controller.step(usize::from(step % 7 == 0));
+    }
+    assert_eq!(allocations() - before, 0);
+    assert!(inspected > 1000, "{inspected}");
 }

@@ -45,11 +45,12 @@ pub fn dead(path: &Path) -> Vec<String> {
 
 /// Paths of the repository that a document names and that do not exist.
 pub fn missing_paths(path: &Path, root: &Path) -> Vec<String> {
-    const FOLDERS: [&str; 8] = [
+    const FOLDERS: [&str; 9] = [
         "bench/",
         "config/",
         "docs/",
         "examples/",
+        "python/",
         "scripts/",
         "services/",
         "shared/",

@@ -160,6 +160,10 @@ fn allowed(manifest: &Manifest) -> Option<Vec<&'static str>> {
     if package == "vigil-examples" {
         return Some(SHARED.to_vec());
     }
+    // Bindings of a library, and what simulates its models.
+    if package == "vigil-pomdp-python" {
+        return Some(vec!["vigil-pomdp", "vigil-missions"]);
+    }
     // Fuzzing of a shared crate, outside the workspace.
     if is_fuzzing(manifest) {
         return Some(SHARED.to_vec());

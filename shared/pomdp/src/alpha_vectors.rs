@@ -39,7 +39,8 @@ pub enum VectorError {
     },
 }
 
-/// At least one vector; values are finite.
+/// At least one vector, each of one value a state: discounted reward to come, in units of reward.
+/// Values are finite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AlphaVectors {
     states: usize,
@@ -51,7 +52,8 @@ impl AlphaVectors {
     /// Vectors (action, value of each state) of a model with so many states and actions.
     ///
     /// # Errors
-    /// [`VectorError`].
+    /// [`VectorError`] for none at all, a wrong length, an unknown action, a value that is not
+    /// finite.
     pub fn new<V: AsRef<[f64]>>(
         states: usize,
         action_count: usize,
@@ -120,7 +122,8 @@ impl AlphaVectors {
         self.actions.iter().copied().zip(values)
     }
 
-    /// The largest alpha·b: at least this is earned from here on.
+    /// The largest alpha·b: at least this is earned from here on. `belief` has one probability a
+    /// state.
     #[must_use]
     pub fn value(&self, belief: &[f64]) -> f64 {
         self.rows()

@@ -31,8 +31,9 @@ pub enum Evidence {
     Impossible,
 }
 
-/// A belief over the states of one model. Every call must be given that model, and actions and
-/// observations that it has; nothing is allocated after [`Tracker::new`].
+/// A belief over the states of one model (Smallwood and Sondik, 1973). Every call must be given
+/// that model, and actions and observations that it has. Nothing is allocated after
+/// [`Tracker::new`].
 #[derive(Debug, Clone)]
 pub struct Tracker {
     /// Sums to 1.
@@ -62,7 +63,7 @@ impl Tracker {
         tracker
     }
 
-    /// The belief: non-negative, sums to 1.
+    /// The belief, one probability a state: non-negative, sums to 1.
     #[must_use]
     pub fn belief(&self) -> &[f64] {
         self.belief.values()
@@ -80,7 +81,8 @@ impl Tracker {
         self.accept(self.next.sum());
     }
 
-    /// Takes over a belief from elsewhere; entries that are not finite or negative count as 0.
+    /// Takes over a belief from elsewhere: one weight a state, in any scale. Entries that are not
+    /// finite or negative count as 0.
     /// Without any mass left, the belief stays as it is, and `false` is returned.
     pub fn anchor(&mut self, weights: &[f64]) -> bool {
         let sound = |w: &f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
@@ -132,8 +134,9 @@ impl Tracker {
         Evidence::Impossible
     }
 
-    /// Soft (virtual) evidence: b'(s) proportional to L(s) b(s). Likelihoods that are not finite
-    /// or negative count as 0, as do those for which the product is below 2.2e-308.
+    /// Soft (virtual) evidence, of one likelihood a state: b'(s) proportional to L(s) b(s).
+    /// Likelihoods that are missing, not finite or negative count as 0, as do those for which the
+    /// product is below 2.2e-308.
     pub fn weigh(&mut self, likelihood: &[f64]) -> Evidence {
         for &s in self.belief.support() {
             let l = likelihood.get(s as usize).copied().unwrap_or(0.0);

@@ -27,7 +27,9 @@ pub struct Warning {
 
 /// A partially observable Markov decision process.
 ///
-/// Two models are equal if all their names and numbers are; warnings do not count.
+/// States, actions and observations are numbered from 0, in the order of their names. What is asked
+/// of an index that the model lacks has no meaning, or panics. Two models are equal if all their
+/// names and numbers are; warnings do not count.
 #[derive(Debug, Clone)]
 pub struct Pomdp {
     discount: f64,
@@ -96,7 +98,8 @@ impl Pomdp {
         self.is_cost
     }
 
-    /// Start belief, as the file gives it: its sum may be off 1 by up to 1e-5.
+    /// Start belief, one probability a state, as the file gives it: its sum may be off 1 by up to
+    /// 1e-5.
     #[must_use]
     pub fn start(&self) -> &[f64] {
         &self.start
@@ -128,7 +131,7 @@ impl Pomdp {
         self.transitions[action].row(state)
     }
 
-    /// Z(a,s',z) for every s'.
+    /// Z(a,s',z) for every s': the probability of the observation in each state that is reached.
     #[must_use]
     pub fn likelihood(&self, action: usize, observation: usize) -> &[f64] {
         let n = self.states.len();

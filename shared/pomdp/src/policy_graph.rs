@@ -15,7 +15,7 @@ use crate::policy::Decider;
 pub struct Limits {
     /// Nodes at most, 1 or more.
     pub nodes_max: usize,
-    /// Beliefs share a node if the sum of their differences is at most this.
+    /// Beliefs share a node if the sum of their differences is at most this, 0 to 2.
     pub tolerance: f64,
 }
 
@@ -24,7 +24,7 @@ pub struct Limits {
 pub struct Node {
     /// Index of the action.
     pub action: usize,
-    /// The belief for which the node was made.
+    /// The belief for which the node was made, one probability a state.
     pub belief: Vec<f64>,
     /// Discounted probability of the most probable way to it: gamma^t times that of the
     /// observations on the way.

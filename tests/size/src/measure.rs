@@ -51,7 +51,8 @@ impl Distribution {
 /// How large the workspace is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Size {
-    /// Lines by room: `shared`, `services`, `tools`, `bench`, `examples`, `tests`.
+    /// Lines by room: `shared`, `services`, `tools`, `bench`, `examples`, `python`,
+    /// `tests`.
     pub rooms: Vec<(&'static str, Lines)>,
     /// Lines of code by crate, but for those without.
     pub crates: Vec<(String, Lines)>,
@@ -64,7 +65,9 @@ pub struct Size {
 }
 
 /// The top folders.
-const ROOMS: [&str; 6] = ["shared", "services", "tools", "bench", "examples", "tests"];
+const ROOMS: [&str; 7] = [
+    "shared", "services", "tools", "bench", "examples", "python", "tests",
+];
 
 /// Counts.
 #[must_use]

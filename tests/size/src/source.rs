@@ -73,7 +73,8 @@ impl Source {
     /// True if the whole file is test code by its place.
     fn is_test_file(&self) -> bool {
         let mut parts = self.path.split('/');
-        parts.next() == Some("tests") || parts.any(|part| part == "tests" || part == "benches")
+        let is_shown = |part| ["tests", "benches", "examples"].contains(&part);
+        parts.next() == Some("tests") || parts.any(is_shown)
     }
 
     /// True if the line, from 1, is test code.
@@ -186,6 +187,7 @@ mod tests {
         let source = |path: &str, text: &str| Source::new(path, text).unwrap();
         assert!(source("tests/tidy/main.rs", "fn a() {}").is_test(1));
         assert!(source("shared/robot/tests/slip.rs", "fn a() {}").is_test(1));
+        assert!(source("shared/robot/examples/slip.rs", "fn a() {}").is_test(1));
         assert!(!source("shared/robot/src/tests.rs", "fn a() {}").is_test(1));
         let lines = "fn a() {}\n#[cfg(test)]\n#[allow(x)]\nmod tests {\n}\nfn b() {}\n\
                      impl A {\n    #[cfg(test)]\n    fn c() {}\n}\n";

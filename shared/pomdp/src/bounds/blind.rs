@@ -9,7 +9,7 @@ use crate::model::Pomdp;
 /// JAIR 13, 2000).
 ///
 /// # Errors
-/// [`SolveError`].
+/// As of [`super::mdp::solve_within`].
 pub fn solve(model: &Pomdp, budget: &mut Budget<'_>) -> Result<ActionValues, SolveError> {
     let n = model.states().len();
     let mut values = Vec::with_capacity(n * model.actions().len());

@@ -9,7 +9,7 @@ use crate::model::Pomdp;
 /// max_a b·Q(.,a), at most that of Q-MDP (Hauskrecht, JAIR 13, 2000).
 ///
 /// # Errors
-/// [`SolveError`].
+/// As of [`mdp::solve_within`], and [`SolveError::Entries`] for tables beyond 20 million entries.
 pub fn solve(model: &Pomdp, budget: &mut Budget<'_>) -> Result<ActionValues, SolveError> {
     let relaxed = mdp::solve_within(model, budget)?;
     solve_from(model, &relaxed, budget)
@@ -18,7 +18,7 @@ pub fn solve(model: &Pomdp, budget: &mut Budget<'_>) -> Result<ActionValues, Sol
 /// As [`solve`], with the fully observable relaxation at hand.
 ///
 /// # Errors
-/// [`SolveError`].
+/// As of [`solve`].
 pub fn solve_from(
     model: &Pomdp,
     relaxed: &mdp::Solution,

@@ -19,7 +19,7 @@ const ROUNDS_MAX: usize = 1000;
 /// only loosens the bound.
 const IMPROVEMENT_MIN: f64 = 1e-12;
 
-/// Q_CO and what follows from it.
+/// Q_CO and what follows from it, in units of reward.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
     states: usize,
@@ -36,7 +36,7 @@ impl Solution {
         self.q[action * self.states + state]
     }
 
-    /// Q_CO(.,a) for every state.
+    /// Q_CO(.,a), one value a state.
     #[must_use]
     pub fn q_of(&self, action: usize) -> &[f64] {
         &self.q[action * self.states..][..self.states]
@@ -67,7 +67,8 @@ impl Solution {
 /// Solves the fully observable relaxation of `model`.
 ///
 /// # Errors
-/// [`SolveError`].
+/// [`SolveError::Unbounded`] and [`SolveError::Mass`] for values without bound, such as those of a
+/// discount of 1; [`SolveError::Size`] for a system that is neither solved by iteration nor small.
 pub fn solve(model: &Pomdp) -> Result<Solution, SolveError> {
     solve_within(model, &mut Budget::new(&mut || false))
 }
@@ -75,7 +76,7 @@ pub fn solve(model: &Pomdp) -> Result<Solution, SolveError> {
 /// As [`solve`], within a budget.
 ///
 /// # Errors
-/// [`SolveError`].
+/// As of [`solve`], and [`SolveError::Stopped`] if the budget ends.
 pub fn solve_within(model: &Pomdp, budget: &mut Budget<'_>) -> Result<Solution, SolveError> {
     let n = model.states().len();
     let (mass_max, longest) = rows(model);

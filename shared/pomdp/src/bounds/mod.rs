@@ -45,7 +45,7 @@ pub(crate) fn contraction(discount: f64, mass_max: f64) -> Result<f64, SolveErro
     }
 }
 
-/// Q[a][.], one row per action.
+/// One vector q_a over the states for each action: `Q[a][s]`, in units of reward.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActionValues {
     states: usize,
@@ -68,7 +68,7 @@ impl ActionValues {
         &self.values[action * self.states..][..self.states]
     }
 
-    /// max_a sum_s b(s) q_a(s).
+    /// max_a sum_s b(s) q_a(s); `belief` has one probability a state.
     #[must_use]
     pub fn value(&self, belief: &[f64]) -> f64 {
         self.rows()

@@ -25,7 +25,7 @@ impl Tib {
         self.q_sparse(&sparse(belief), action)
     }
 
-    /// max_a Q(b,a): an upper bound of V*(b).
+    /// max_a Q(b,a): an upper bound of V*(b). `belief` has one probability a state.
     #[must_use]
     pub fn value(&self, belief: &[f64]) -> f64 {
         self.value_sparse(&sparse(belief))

@@ -62,7 +62,7 @@ impl Decider {
         }
     }
 
-    /// The action for a belief.
+    /// The action for a belief of one probability a state.
     pub fn decide(&mut self, belief: &[f64]) -> Decision {
         let choice = self.policy.evaluate(belief, &mut self.values);
         assert!(
@@ -104,7 +104,8 @@ impl Decider {
         self.action_entropy
     }
 
-    /// How much of the belief is in states whose best action this is, as of the last decision.
+    /// For each action, how much of the belief is in states whose best action it is, as of the last
+    /// decision: 0 to 1.
     #[must_use]
     pub fn votes(&self) -> &[f64] {
         &self.votes

@@ -119,7 +119,7 @@ impl DualControl {
     /// Around `policy`, for a model and its fully observable relaxation.
     ///
     /// # Errors
-    /// [`DualError`].
+    /// [`DualError`] for a threshold beyond 0 to 1, and for information actions that are none.
     pub fn new(
         policy: Box<dyn Policy>,
         model: &Pomdp,

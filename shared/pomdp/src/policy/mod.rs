@@ -76,10 +76,12 @@ pub enum Measure {
     Entropy,
 }
 
-/// A policy over beliefs. Deciding allocates nothing.
-pub trait Policy {
+/// A policy over beliefs. Deciding allocates nothing. `Send`, so that it may be built on one thread
+/// and decide on another.
+pub trait Policy: Send {
     /// Writes the value (or votes) of every action into `values`, and chooses; of two actions the
-    /// one with the larger value is the better in the policy's eyes.
+    /// one with the larger value is the better in the policy's eyes. `belief` holds one probability
+    /// a state and sums to 1, `values` has one place an action.
     fn evaluate(&mut self, belief: &[f64], values: &mut [f64]) -> Choice;
 
     /// What the values are, in a step that is not for information.

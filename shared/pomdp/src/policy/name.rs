@@ -37,7 +37,7 @@ impl Base {
     /// The policy for a model, of which `solution` is the fully observable relaxation.
     ///
     /// # Errors
-    /// [`SolveError`] if its values cannot be found.
+    /// [`SolveError`] if the values of `fib` cannot be found; the others have theirs.
     pub fn build(self, model: &Pomdp, solution: &Solution) -> Result<Box<dyn Policy>, SolveError> {
         Ok(match self {
             Self::MostLikelyState => Box::new(MostLikelyState::new(solution.clone())),

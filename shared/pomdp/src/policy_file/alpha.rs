@@ -42,7 +42,7 @@ pub fn write(vectors: &AlphaVectors) -> String {
 /// Reads vectors of `model`; empty lines and comments from `#` on are passed over.
 ///
 /// # Errors
-/// [`AlphaTextError`].
+/// [`AlphaTextError`], with the line where it has one.
 pub fn read(text: &str, model: &Pomdp) -> Result<AlphaVectors, AlphaTextError> {
     let lines = text.lines().enumerate().map(|(at, line)| {
         let content = line.split('#').next().unwrap_or_default();

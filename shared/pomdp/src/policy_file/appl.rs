@@ -77,7 +77,7 @@ pub fn write(vectors: &AlphaVectors, model_name: &str) -> String {
 /// Reads vectors of `model`. Mixed observability (`numObsValue` above 1) is refused.
 ///
 /// # Errors
-/// [`ApplError`].
+/// [`ApplError`], with the line where it has one.
 pub fn read(text: &str, model: &Pomdp) -> Result<AlphaVectors, ApplError> {
     let document = Document::parse(text).map_err(|error| ApplError::Xml(error.to_string()))?;
     let policy = named(document.root_element(), "Policy")?;

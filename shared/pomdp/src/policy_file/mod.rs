@@ -79,7 +79,8 @@ pub struct PolicyFile {
     pub discount: f64,
     /// What found it, such as `sarsop`.
     pub method: String,
-    /// The optimal value at the start belief is at least this, and so is this policy's.
+    /// The optimal value at the start belief is at least this, and so is this policy's; in units of
+    /// reward.
     pub lower: f64,
     /// ... and at most this; none if the method gives none.
     pub upper: Option<f64>,

@@ -43,7 +43,7 @@ pub struct Compact {
     /// Its vectors, some of those that it was chosen from.
     pub vectors: AlphaVectors,
     /// What the policy earns less than all of them promise, from the start belief, at most: the
-    /// mean over sampled runs.
+    /// mean over sampled runs, in units of reward.
     pub loss_mean: f64,
     /// Standard error of the mean.
     pub loss_error: f64,

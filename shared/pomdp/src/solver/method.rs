@@ -110,7 +110,7 @@ impl Answer {
 /// A budget that ends is not an error: what was found until then is the answer.
 ///
 /// # Errors
-/// [`SolveError`].
+/// [`SolveError`] for values without bound, and for a model that is too large for the method.
 pub fn bound(
     method: Method,
     model: &Pomdp,

@@ -16,7 +16,7 @@ use crate::model::Pomdp;
 use crate::policy::Policy;
 use crate::sparse_beliefs::{BeliefId, SparseBeliefs, dot, sparse};
 
-/// The value of a policy at the start belief lies between these.
+/// The value of a policy at the start belief lies between these, in units of reward.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PolicyValue {
     /// The least that it may be.

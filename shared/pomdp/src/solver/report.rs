@@ -2,7 +2,7 @@
 
 use crate::alpha_vectors::AlphaVectors;
 
-/// What is known of the optimal value at the start belief.
+/// What is known of the optimal value at the start belief, in units of reward.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bracket {
     /// At least this; minus infinity if nothing is known.

@@ -32,7 +32,7 @@ fn solved(text: &str) -> (Pomdp, Solution) {
 }
 
 fn navigation() -> (Pomdp, Solution) {
-    solved(include_str!("../../../../config/navigation.pomdp"))
+    solved(include_str!("../models/navigation.pomdp"))
 }
 
 fn dual(of: &(Pomdp, Solution), settings: Dual) -> DualControl {

@@ -9,8 +9,8 @@ use vigil_pomdp::{AlphaVectors, Budget, PointBased, Policy, Pomdp, mdp};
 
 use crate::public::TIGER;
 
-const NAVIGATION: &str = include_str!("../../../../config/navigation.pomdp");
-const FAULTS: &str = include_str!("../../../decision/tests/decision/world/by_hand.pomdp");
+const NAVIGATION: &str = include_str!("../models/navigation.pomdp");
+const FAULTS: &str = include_str!("../models/faults.pomdp");
 
 fn solved(model: &Pomdp, precision: f64) -> AlphaVectors {
     let options = Options {

@@ -107,7 +107,7 @@ fn assert_same(found: &Pomdp, model: &Pomdp) {
 
 #[test]
 fn a_model_in_code_is_that_of_its_file() {
-    let shipped = include_str!("../../../../config/rover.pomdp");
+    let shipped = include_str!("../models/rover.pomdp");
     for text in [TIGER, MDP, shipped] {
         let model = Pomdp::parse(text).unwrap();
         for change in [Change::Nothing, Change::Split] {
