@@ -22,6 +22,7 @@
 
 mod completion;
 mod decider;
+mod despot;
 mod dual;
 mod entropy;
 mod fast_informed;
@@ -33,6 +34,7 @@ mod qmdp;
 mod voting;
 
 pub use decider::{Decider, Decision};
+pub use despot::{Despot, DespotOptions};
 pub use dual::{Dual, DualControl, DualError, Gate, Information};
 pub use entropy::normalised_entropy;
 pub use fast_informed::FastInformed;
