@@ -2,6 +2,7 @@
 
 mod alarm_fusion;
 mod decision_process;
+mod despot_settings;
 mod epoch;
 mod error;
 mod fault_decision;
@@ -20,6 +21,7 @@ mod switching_cost;
 mod symptom_decision;
 
 pub use alarm_fusion::fused_alarm;
+pub use despot_settings::DespotSettings;
 pub use error::SupervisorError;
 pub use inputs::Inputs;
 pub use mapping::Compensation;

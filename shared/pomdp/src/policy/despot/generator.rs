@@ -1,10 +1,10 @@
 //! The model as scenarios need it: successors by a random number, the observations that a state can
 //! give, and what plans are worth in a state.
 
-use crate::alpha_vectors::AlphaVectors;
 use crate::bounds::{ActionValues, SolveError, blind, fib, mdp};
 use crate::budget::Budget;
 use crate::model::Pomdp;
+use crate::policy::PointBased;
 
 /// Rows of (index, number), of any length.
 #[derive(Debug, Clone, Default)]
@@ -53,7 +53,7 @@ impl Generator {
     pub(super) fn new(
         model: &Pomdp,
         solution: &mdp::Solution,
-        solved: Option<&AlphaVectors>,
+        solved: Option<&PointBased>,
     ) -> Result<Self, SolveError> {
         let (n, actions) = (model.states().len(), model.actions().len());
         let mut never = || false;
@@ -63,15 +63,15 @@ impl Generator {
             upper => upper?,
         };
         let lower = blind::solve(model, budget)?;
-        let blind = (0..actions).map(|a| (a, lower.values(a)));
-        let plans: Vec<(usize, &[f64])> = blind
-            .chain(solved.into_iter().flat_map(AlphaVectors::rows))
-            .collect();
-        let mut bounds = Vec::with_capacity(n * (actions + plans.len()));
+        let of_solver = |s| solved.map_or(&[][..], |solved| solved.column(s));
+        let mut bounds = Vec::with_capacity(n * (2 * actions + of_solver(0).len()));
         for s in 0..n {
             bounds.extend(upper.rows().filter_map(|row| row.get(s)));
-            bounds.extend(plans.iter().filter_map(|(_, plan)| plan.get(s)));
+            bounds.extend(lower.rows().filter_map(|row| row.get(s)));
+            bounds.extend(of_solver(s));
         }
+        let first_actions = solved.map_or(&[][..], PointBased::first_actions).iter();
+        let plans = (0..actions).chain(first_actions.copied());
         let pairs = (0..actions).flat_map(|a| (0..n).map(move |s| (s, a)));
         Ok(Self {
             states: n,
@@ -82,7 +82,7 @@ impl Generator {
             observed: observed(model),
             rewards: pairs.map(|(s, a)| model.reward(s, a)).collect(),
             bounds,
-            plans: plans.iter().map(|(action, _)| *action as u32).collect(),
+            plans: plans.map(|action| action as u32).collect(),
         })
     }
 
@@ -126,15 +126,6 @@ impl Generator {
     /// The action that each plan begins with.
     pub(super) fn plans(&self) -> &[u32] {
         &self.plans
-    }
-
-    /// How far the bounds of any state are apart.
-    pub(super) fn span(&self) -> f64 {
-        let gap = |state: usize| {
-            let (upper, lower) = self.bounds(state as u32).split_at(self.actions);
-            largest(upper) - largest(lower)
-        };
-        (0..self.states).map(gap).fold(0.0, f64::max)
     }
 }
 

@@ -15,7 +15,7 @@ pub(super) struct Scenarios {
     rng: Pcg64Mcg,
     states: Vec<u32>,
     weights: Vec<f64>,
-    /// Of the steps that have been asked for: one number a scenario.
+    /// Of the steps that are prepared: one number a scenario.
     chances: Vec<f64>,
     /// A permutation of the scenarios, for the next step.
     order: Vec<u32>,
@@ -62,7 +62,8 @@ impl Scenarios {
         if sum > 0.0 && sum.is_finite() {
             self.fill(support, sum);
         } else {
-            self.fill(|| (0..belief.len().max(1) as u32).map(|s| (s, 1.0)), belief.len() as f64);
+            let states = belief.len() as u32;
+            self.fill(|| (0..states).map(|state| (state, 1.0)), f64::from(states));
         }
     }
 
@@ -80,8 +81,11 @@ impl Scenarios {
             let taken = (passed / sum * spare + offset).floor();
             passed += b;
             let due = (passed / sum * spare + offset).floor();
-            let copies = (each + (due - taken) as usize).min(count - at);
-            let weight = if each == 1 { b / sum / copies as f64 } else { 1.0 / count as f64 };
+            let copies = (each + (due - taken).max(0.0) as usize).min(count - at);
+            let weight = match each {
+                1 => b / sum / copies as f64,
+                _ => 1.0 / count as f64,
+            };
             self.states[at..at + copies].fill(state);
             self.weights[at..at + copies].fill(weight);
             at += copies;
@@ -90,17 +94,22 @@ impl Scenarios {
         self.weights[at..].fill(0.0);
     }
 
-    /// The random numbers of a step, one a scenario, evenly spread over [0, 1); `None` beyond the
-    /// last step.
-    pub(super) fn chances(&mut self, step: usize) -> Option<&[f64]> {
-        let count = self.states.len();
-        while self.chances.len() <= step * count {
-            if self.chances.len() + count > self.chances.capacity() {
-                return None;
-            }
+    /// Makes sure of the random numbers of a step; those of the steps before are there. False
+    /// beyond the last step.
+    pub(super) fn prepare(&mut self, step: usize) -> bool {
+        let end = (step + 1) * self.states.len();
+        if self.chances.len() < end && end <= self.chances.capacity() {
             self.add_step();
         }
-        self.chances.get(step * count..(step + 1) * count)
+        self.chances.len() >= end
+    }
+
+    /// The random numbers of a step, one a scenario, evenly spread over [0, 1); none of a step that
+    /// is not prepared.
+    pub(super) fn chances(&self, step: usize) -> &[f64] {
+        let count = self.states.len();
+        let chances = self.chances.get(step * count..(step + 1) * count);
+        chances.unwrap_or_default()
     }
 
     fn add_step(&mut self) {
@@ -116,7 +125,10 @@ impl Scenarios {
             }
         }
         let shift: f64 = self.rng.random();
-        let numbers = self.order.iter().map(|place| (f64::from(*place) * GOLDEN + shift).fract());
+        let numbers = self
+            .order
+            .iter()
+            .map(|place| (f64::from(*place) * GOLDEN + shift).fract());
         self.chances.extend(numbers);
     }
 }

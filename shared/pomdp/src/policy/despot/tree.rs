@@ -1,4 +1,7 @@
-//! The tree of a search: nodes are beliefs, branches actions, in arenas of fixed size.
+//! The tree of a search, in arenas of fixed size: nodes are beliefs, branches actions.
+//!
+//! Values are weighted: by the probability of a node, by the discount of its depth, and less the
+//! cost of every node of a plan (Ye et al. 2017, section 5). So bounds of children simply add up.
 
 use super::generator::{Generator, largest};
 use super::scenarios::Scenarios;
@@ -6,37 +9,29 @@ use super::scenarios::Scenarios;
 /// No index.
 const NONE: u32 = u32::MAX;
 
-/// Bounds of what a node adds to the value of the root: weighted by its probability and discounted.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Worth {
-    /// What is earned for certain in the scenarios, less the cost of the plan.
+/// Bounds of what a node or a branch adds to the value of the root.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Bracket {
     pub lower: f64,
     pub upper: f64,
-    /// In between: what is expected where the search has ended.
-    pub estimate: f64,
 }
 
-impl Worth {
-    const NOTHING: Self = Self {
-        lower: 0.0,
-        upper: 0.0,
-        estimate: 0.0,
-    };
+impl Bracket {
+    const fn point(value: f64) -> Self {
+        Self {
+            lower: value,
+            upper: value,
+        }
+    }
 
     fn add(&mut self, other: Self) {
         self.lower += other.lower;
         self.upper += other.upper;
-        self.estimate += other.estimate;
     }
 
-    fn at_least(&mut self, other: Self) {
+    fn raise(&mut self, other: Self) {
         self.lower = self.lower.max(other.lower);
         self.upper = self.upper.max(other.upper);
-        self.estimate = self.estimate.max(other.estimate);
-    }
-
-    const fn gap(self) -> f64 {
-        self.upper - self.lower
     }
 }
 
@@ -50,10 +45,10 @@ struct Node {
     /// The first of its branches, one an action; or none.
     first_branch: u32,
     depth: u32,
-    /// Of the best plan that is known without a search.
+    /// What the best plan earns that is known without a search.
     plain: f64,
-    worth: Worth,
-    /// The widest gap of a leaf that the best actions may lead to.
+    bracket: Bracket,
+    /// The widest gap of a leaf that the most promising actions may lead to.
     widest: f64,
 }
 
@@ -63,20 +58,18 @@ struct Branch {
     node: u32,
     first_child: u32,
     children: u32,
-    /// Weighted, discounted, less the cost of a node.
+    /// Less the cost of a node.
     reward: f64,
-    worth: Worth,
+    bracket: Bracket,
 }
 
-/// What limits and shapes a search.
+/// What limits a search.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limits {
     pub nodes: usize,
     pub depth: usize,
     /// Cost of a node of a plan.
     pub cost: f64,
-    /// Where between its bounds a node without branches is worth what.
-    pub optimism: f64,
 }
 
 /// The tree, and what its growth needs.
@@ -91,16 +84,18 @@ pub(super) struct Tree {
     weights: Vec<f64>,
     /// For each observation: the weighted sum of the bounds.
     sums: Vec<f64>,
-    /// Observations of which `sums` holds anything.
+    /// Observations of which `sums` holds something.
     met: Vec<u32>,
     is_met: Vec<bool>,
 }
 
 impl Tree {
+    /// Without a root.
     pub(super) fn new(generator: &Generator, scenarios: usize, limits: Limits) -> Self {
         Self {
             limits,
-            nodes: Vec::with_capacity(limits.nodes.max(1)),
+            nodes: Vec::with_capacity(limits.nodes),
+            // Every branch has a child.
             branches: Vec::with_capacity(limits.nodes),
             states: Vec::with_capacity(limits.nodes * scenarios),
             weights: vec![0.0; scenarios],
@@ -110,44 +105,53 @@ impl Tree {
         }
     }
 
-    /// Forgets everything.
-    pub(super) fn clear(&mut self) {
+    /// Memory of a tree, bytes.
+    pub(super) const fn bytes(nodes: usize, scenarios: usize) -> usize {
+        let of_states = size_of::<u32>().saturating_mul(scenarios);
+        nodes.saturating_mul(size_of::<Node>() + size_of::<Branch>() + of_states)
+    }
+
+    /// Begins anew with a root for scenarios that have just been drawn.
+    pub(super) fn plant(&mut self, generator: &Generator, scenarios: &Scenarios) {
         self.nodes.clear();
         self.branches.clear();
         self.states.clear();
-    }
-
-    /// A root for scenarios that have just been drawn.
-    pub(super) fn plant(&mut self, generator: &Generator, scenarios: &Scenarios) {
-        self.clear();
         let sums = &mut self.sums[..generator.width()];
         sums.fill(0.0);
         for (&state, weight) in scenarios.states().iter().zip(scenarios.weights()) {
             add_scaled(sums, generator.bounds(state), *weight);
         }
-        let (upper, plans) = sums.split_at(generator.actions);
-        let bounds = (largest(plans), largest(upper));
-        let root = leaf(NONE, 0, 0, bounds, &self.limits);
-        self.nodes.push(root);
+        let root = Node {
+            branch: NONE,
+            observation: 0,
+            first_branch: NONE,
+            depth: 0,
+            plain: 0.0,
+            bracket: Bracket::point(0.0),
+            widest: 0.0,
+        };
+        self.nodes.push(leaf(root, sums, generator, &self.limits));
     }
 
     /// Bounds of the root.
-    pub(super) fn root(&self) -> Worth {
-        self.nodes.first().map_or(Worth::NOTHING, |root| root.worth)
+    pub(super) fn root(&self) -> Option<Bracket> {
+        self.nodes.first().map(|root| root.bracket)
     }
 
     /// Bounds of an action in the root; `None` before the first trial.
-    pub(super) fn action(&self, action: usize) -> Option<Worth> {
+    pub(super) fn action(&self, action: usize) -> Option<Bracket> {
         let root = self.nodes.first()?;
         let branch = (root.first_branch as usize).checked_add(action)?;
-        self.branches.get(branch).map(|branch| branch.worth)
+        self.branches.get(branch).map(|branch| branch.bracket)
     }
 
-    /// Goes down to where the best action is most uncertain, and looks one step further there.
-    /// False if there is nothing to gain, or no room.
+    /// A trial: looks one step further at the leaf with the widest gap of all that the most
+    /// promising actions may lead to (Ross et al. 2008, section 3.4). False if no such leaf is
+    /// left, or no room.
     pub(super) fn grow(&mut self, generator: &Generator, scenarios: &mut Scenarios) -> bool {
         let room = generator.actions * generator.observations;
-        if self.nodes.is_empty() || self.nodes.len() + room > self.limits.nodes {
+        let is_full = self.nodes.len().saturating_add(room) > self.limits.nodes;
+        if is_full || self.nodes.first().is_none_or(|root| root.widest <= 0.0) {
             return false;
         }
         self.weights.copy_from_slice(scenarios.weights());
@@ -159,36 +163,42 @@ impl Tree {
             at = child;
             self.weigh(at, generator);
         }
-        if self.nodes[at].worth.gap() <= 0.0 || !self.expand(at, generator, scenarios) {
+        if !scenarios.prepare(self.nodes[at].depth as usize) {
             return false;
+        }
+        self.nodes[at].first_branch = self.branches.len() as u32;
+        for action in 0..generator.actions {
+            self.simulate(at, action, generator, scenarios);
+            self.observe(at, action, generator, scenarios);
         }
         self.back_up(at, generator.actions);
         true
     }
 
-    /// The most uncertain child of the best action of a node.
+    /// The child of the most promising action that leads to the widest gap.
     fn most_uncertain(&self, at: usize, actions: usize) -> Option<usize> {
         let first = self.nodes[at].first_branch as usize;
-        let branches = self.branches.get(first..first + actions)?.iter();
+        let branches = self.branches[first..first + actions].iter();
         let best = branches.reduce(|best, other| {
-            let is_better = other.worth.upper > best.worth.upper;
+            let is_better = other.bracket.upper > best.bracket.upper;
             if is_better { other } else { best }
         })?;
-        let children = best.first_child as usize..(best.first_child + best.children) as usize;
-        let mut widest = (None, 0.0);
-        for child in children {
-            let gap = self.nodes[child].widest;
-            if gap > widest.1 {
-                widest = (Some(child), gap);
-            }
-        }
-        widest.0
+        let widest = best.children().reduce(|widest, other| {
+            let is_wider = self.nodes[other].widest > self.nodes[widest].widest;
+            if is_wider { other } else { widest }
+        });
+        widest.filter(|child| self.nodes[*child].widest > 0.0)
     }
 
-    /// Takes the observation of a node into account.
+    /// The weights of a node, from those of its parent.
     fn weigh(&mut self, at: usize, generator: &Generator) {
-        let Node { branch, observation, .. } = self.nodes[at];
-        let action = self.action_of(branch as usize);
+        let Node {
+            branch,
+            observation,
+            ..
+        } = self.nodes[at];
+        let parent = self.branches[branch as usize].node as usize;
+        let action = branch as usize - self.nodes[parent].first_branch as usize;
         let count = self.weights.len();
         let states = &self.states[branch as usize * count..][..count];
         for (weight, &next) in self.weights.iter_mut().zip(states) {
@@ -198,44 +208,26 @@ impl Tree {
         }
     }
 
-    fn action_of(&self, branch: usize) -> usize {
-        let node = self.branches[branch].node as usize;
-        branch - self.nodes[node].first_branch as usize
+    /// The state of a scenario in a node.
+    fn state(&self, at: usize, scenario: usize, scenarios: &Scenarios) -> u32 {
+        match self.nodes[at].branch {
+            NONE => scenarios.states()[scenario],
+            branch => self.states[branch as usize * self.weights.len() + scenario],
+        }
     }
 
-    /// Gives a node its branches. False at the greatest depth.
-    fn expand(&mut self, at: usize, generator: &Generator, scenarios: &mut Scenarios) -> bool {
-        let Node { branch, depth, .. } = self.nodes[at];
-        let count = self.weights.len();
-        if scenarios.chances(depth as usize).is_none() {
-            return false;
+    /// Writes the states of the scenarios after one action more.
+    fn simulate(&mut self, at: usize, action: usize, generator: &Generator, with: &Scenarios) {
+        let depth = self.nodes[at].depth as usize;
+        for (scenario, &chance) in with.chances(depth).iter().enumerate() {
+            let state = self.state(at, scenario, with);
+            self.states.push(generator.successor(state, action, chance));
         }
-        self.nodes[at].first_branch = self.branches.len() as u32;
-        for action in 0..generator.actions {
-            let before = self.states.len();
-            for scenario in 0..count {
-                let state = match branch {
-                    NONE => scenarios.states()[scenario],
-                    branch => self.states[branch as usize * count + scenario],
-                };
-                let chance = scenarios.chances(depth as usize).map_or(0.0, |c| c[scenario]);
-                self.states.push(generator.successor(state, action, chance));
-            }
-            let _ = before;
-            self.branch(at, action, generator, scenarios);
-        }
-        true
     }
 
-    /// One branch, whose scenarios' states have just been written.
-    fn branch(
-        &mut self,
-        at: usize,
-        action: usize,
-        generator: &Generator,
-        scenarios: &Scenarios,
-    ) {
-        let Node { branch, depth, .. } = self.nodes[at];
+    /// Adds the branch whose states have just been written, with a child for each observation.
+    /// Every scenario counts in each of them, by the observation's likelihood (Garg et al. 2019).
+    fn observe(&mut self, at: usize, action: usize, generator: &Generator, with: &Scenarios) {
         let (count, width) = (self.weights.len(), generator.width());
         let first = self.states.len() - count;
         let mut reward = 0.0;
@@ -244,11 +236,7 @@ impl Tree {
             if weight <= 0.0 {
                 continue;
             }
-            let state = match branch {
-                NONE => scenarios.states()[scenario],
-                branch => self.states[branch as usize * count + scenario],
-            };
-            reward += weight * generator.reward(state, action);
+            reward += weight * generator.reward(self.state(at, scenario, with), action);
             let next = self.states[first + scenario];
             for &(z, p) in generator.observed(next, action) {
                 let sums = &mut self.sums[z as usize * width..][..width];
@@ -259,75 +247,87 @@ impl Tree {
                 add_scaled(sums, generator.bounds(next), weight * p);
             }
         }
-        let discount = generator.discount.powi(depth as i32);
-        let index = self.branches.len() as u32;
-        let reward = discount * reward - self.limits.cost;
-        let first_child = self.nodes.len() as u32;
-        let mut worth = Worth { lower: reward, upper: reward, estimate: reward };
-        for &z in &self.met {
-            self.is_met[z as usize] = false;
-            let sums = &self.sums[z as usize * width..][..width];
-            let (upper, plans) = sums.split_at(generator.actions);
-            let next = discount * generator.discount;
-            let bounds = (next * largest(plans), next * largest(upper));
-            let child = leaf(index, z, depth + 1, bounds, &self.limits);
-            worth.add(child.worth);
-            self.nodes.push(child);
+        let depth = self.nodes[at].depth;
+        let reward = generator.discount.powi(depth as i32) * reward - self.limits.cost;
+        let (branch, first_child) = (self.branches.len() as u32, self.nodes.len() as u32);
+        for &observation in &self.met {
+            self.is_met[observation as usize] = false;
+            let child = Node {
+                branch,
+                observation,
+                first_branch: NONE,
+                depth: depth + 1,
+                ..self.nodes[at]
+            };
+            let sums = &self.sums[observation as usize * width..][..width];
+            self.nodes.push(leaf(child, sums, generator, &self.limits));
         }
         self.met.clear();
-        self.branches.push(Branch {
+        let mut branch = Branch {
             node: at as u32,
             first_child,
             children: self.nodes.len() as u32 - first_child,
             reward,
-            worth,
-        });
+            bracket: Bracket::point(reward),
+        };
+        self.add_children(&mut branch);
+        self.branches.push(branch);
     }
 
-    /// From a node whose branches are new to the root.
+    fn add_children(&self, branch: &mut Branch) {
+        branch.bracket = Bracket::point(branch.reward);
+        for child in branch.children() {
+            branch.bracket.add(self.nodes[child].bracket);
+        }
+    }
+
+    /// Bounds from a node whose branches are new up to the root.
     fn back_up(&mut self, mut at: usize, actions: usize) {
         loop {
             let node = self.nodes[at];
             let first = node.first_branch as usize;
-            let mut worth = Worth { lower: node.plain, upper: node.plain, estimate: node.plain };
+            let mut bracket = Bracket::point(node.plain);
             for branch in &self.branches[first..first + actions] {
-                worth.at_least(branch.worth);
+                bracket.raise(branch.bracket);
             }
-            self.nodes[at].worth = worth;
             let child = self.most_uncertain(at, actions);
-            self.nodes[at].widest = child.map_or(0.0, |child| self.nodes[child].widest);
+            let widest = child.map_or(0.0, |child| self.nodes[child].widest);
+            (self.nodes[at].bracket, self.nodes[at].widest) = (bracket, widest);
             if node.branch == NONE {
                 return;
             }
-            let branch = self.branches[node.branch as usize];
-            let children = branch.first_child as usize..(branch.first_child + branch.children) as usize;
-            let reward = branch.reward;
-            let mut worth = Worth { lower: reward, upper: reward, estimate: reward };
-            for child in &self.nodes[children] {
-                worth.add(child.worth);
-            }
-            self.branches[node.branch as usize].worth = worth;
+            let mut branch = self.branches[node.branch as usize];
+            self.add_children(&mut branch);
+            self.branches[node.branch as usize] = branch;
             at = branch.node as usize;
         }
     }
 }
 
-fn leaf(branch: u32, observation: u32, depth: u32, bounds: (f64, f64), limits: &Limits) -> Node {
-    let (lower, upper) = bounds;
-    let is_last = depth as usize >= limits.depth;
-    let upper = if is_last { lower } else { lower.max(upper - limits.cost) };
+impl Branch {
+    const fn children(&self) -> std::ops::Range<usize> {
+        self.first_child as usize..(self.first_child + self.children) as usize
+    }
+}
+
+/// The node with bounds from the weighted sums of those of its states. At the greatest depth the
+/// best plan that is known is followed.
+fn leaf(node: Node, sums: &[f64], generator: &Generator, limits: &Limits) -> Node {
+    let (upper, plans) = sums.split_at(generator.actions);
+    let discount = generator.discount.powi(node.depth as i32);
+    let plain = discount * largest(plans);
+    let upper = match (node.depth as usize) < limits.depth {
+        true => plain.max(discount * largest(upper) - limits.cost),
+        false => plain,
+    };
     Node {
-        branch,
-        observation,
-        first_branch: NONE,
-        depth,
-        plain: lower,
-        worth: Worth {
-            lower,
+        plain,
+        bracket: Bracket {
+            lower: plain,
             upper,
-            estimate: lower + limits.optimism * (upper - lower),
         },
-        widest: upper - lower,
+        widest: upper - plain,
+        ..node
     }
 }
 
