@@ -101,7 +101,7 @@ pub enum PolicyKind {
 
 /// A name that no policy has, solved ones included.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}, {DESPOT} and {POINT_BASED}")]
+#[error("{0}, {DESPOT}, and {POINT_BASED}")]
 pub struct KindError(NameError);
 
 impl PolicyKind {

@@ -67,7 +67,8 @@ impl Despot {
             ..
         } = *options;
         options.check()?;
-        let bytes = Tree::bytes(nodes, scenarios) + size_of::<f64>() * scenarios * depth;
+        let bytes = Tree::bytes(nodes, scenarios);
+        let bytes = bytes.saturating_add(size_of::<f64>() * scenarios * depth);
         if bytes > options::BYTES_MAX {
             return Err(DespotError::Memory {
                 nodes,
