@@ -24,9 +24,9 @@ use vigil_terminal::{CommandError, Outcome};
 ///
 /// Every policy meets the same random numbers at the same step of the same mission. The policies
 /// are mls, av, qmdp, fib, random, despot, point-based (with --policy-file) and escalation-N. The
-/// dual controls dm-X and adm-X of the first four gather information while the entropy (0 to 1) is above
-/// a threshold K; each runs with each threshold. escalation-N takes the next action of --ladder
-/// after N symptoms in a row.
+/// dual controls dm-X and adm-X of the first four gather information while the entropy (0 to 1) is
+/// above a threshold K; each runs with each threshold. escalation-N takes the next action of
+/// --ladder after N symptoms in a row.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model (.pomdp or .pomdpx).
