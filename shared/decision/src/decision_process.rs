@@ -39,6 +39,9 @@ pub(crate) trait DecisionRule {
 
     /// Writes the decision, and counts it if it is a new one.
     fn write(&mut self, action: &mut Action);
+
+    /// Spends a share of spare time on the belief that stands.
+    fn improve(&mut self);
 }
 
 /// What the robot is to do; a change of it is a new decision.
@@ -100,6 +103,12 @@ impl DecisionProcess {
         self.decider.reset();
         self.log_evidence = 0.0;
         self.control_mode = ControlMode::Policy;
+    }
+
+    /// Spends a share of spare time on the belief that stands: the next decision may be a better
+    /// one.
+    pub(crate) fn improve(&mut self) {
+        self.decider.improve(self.tracker.belief());
     }
 
     /// Counts input that cannot be.

@@ -264,6 +264,10 @@ impl DecisionRule for FaultDecision {
         self.begin();
     }
 
+    fn improve(&mut self) {
+        self.process.improve();
+    }
+
     fn latched(&self) -> Option<usize> {
         self.latch.action()
     }

@@ -2,6 +2,7 @@
 
 mod alarm_fusion;
 mod decision_process;
+mod despot_settings;
 mod epoch;
 mod error;
 mod fault_decision;
@@ -22,6 +23,7 @@ mod symptom_decision;
 mod wheels;
 
 pub use alarm_fusion::fused_alarm;
+pub use despot_settings::DespotSettings;
 pub use error::SupervisorError;
 pub use inputs::Inputs;
 pub use mapping::Compensation;

@@ -18,7 +18,8 @@ pub(crate) fn decider(
     let kind: PolicyKind = settings.policy.parse()?;
     let allowed = information_actions(model, settings)?;
     let dual = |information| dual(information, settings, allowed);
-    Ok(kind.build(model, solution, dual, solved)?)
+    let options = settings.despot.options();
+    Ok(kind.build(model, solution, dual, solved, &options)?)
 }
 
 fn dual(information: Information, settings: &Settings, allowed: Vec<usize>) -> Dual {

@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 use vigil_blocks::RecoveryKind;
 
+use crate::despot_settings::DespotSettings;
+
 /// The decision system.
 #[derive(Debug, Clone, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -26,12 +28,15 @@ pub struct Settings {
     /// Policy: `qmdp`, `mls` (the best action of the most likely state), `av` (action voting),
     /// `fib` (fast informed bound), or one of these with dual control, which gathers information
     /// while the belief is too uncertain: `dm-X` about the state, `adm-X` about the best action.
-    /// Or `point-based`, solved beforehand: see `policy_file`.
+    /// Or `point-based`, solved beforehand: see `policy_file`. Or `despot`, which plans while it
+    /// decides: see `[supervisor.despot]`.
     #[default = "qmdp"]
     pub policy: String,
-    /// With `point-based`, and only then: file that `vigil pomdp solve MODEL --out FILE` has
-    /// written for the decision model; relative to the graph file.
+    /// File that `vigil pomdp solve MODEL --out FILE` has written for the decision model; relative
+    /// to the graph file. Required by `point-based`; `despot` may end its plans with it.
     pub policy_file: Option<String>,
+    /// With `despot`: what its search may spend.
+    pub despot: DespotSettings,
     /// Dual control: information is gathered above this entropy, where 0 is certain; 1: never.
     #[default(0.5)]
     #[schemars(range(min = 0.0, max = 1.0))]

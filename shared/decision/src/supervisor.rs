@@ -69,6 +69,7 @@ impl Supervisor {
     pub fn step(&mut self, entry: Entry<Inputs<'_>>, action: &mut Action) {
         let entry = self.fusion.take(entry);
         let situation = self.fusion.situation();
+        let is_frame = matches!(entry, Entry::Frame(_));
         match entry {
             Entry::Frame(inputs) if situation.is_blind => self.rule.take_blindly(inputs),
             Entry::Frame(inputs) => self.rule.take(inputs, situation),
@@ -85,6 +86,9 @@ impl Supervisor {
             self.decision_seq
         );
         self.decision_seq = action.decision_seq;
+        if is_frame {
+            self.rule.improve();
+        }
     }
 
     /// The action that stands whatever is believed: a call for help, or the end of the task. It
@@ -116,6 +120,7 @@ mod tests {
         fn write(&mut self, action: &mut Action) {
             action.decision_seq = self.0;
         }
+        fn improve(&mut self) {}
     }
 
     #[test]

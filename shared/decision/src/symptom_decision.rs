@@ -280,6 +280,10 @@ impl DecisionRule for SymptomDecision {
         self.open_decision();
     }
 
+    fn improve(&mut self) {
+        self.process.improve();
+    }
+
     fn latched(&self) -> Option<usize> {
         self.latch.action()
     }

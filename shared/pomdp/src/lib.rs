@@ -34,6 +34,6 @@ pub use budget::Budget;
 pub use model::{Pomdp, Warning};
 pub use parse_error::{ParseError, Position};
 pub use policy::{
-    ActionVoting, Choice, Control, Decider, MostLikelyState, PointBased, Policy, QMdp,
+    ActionVoting, Choice, Control, Decider, Despot, MostLikelyState, PointBased, Policy, QMdp,
 };
 pub use process::{Process, ProcessError};

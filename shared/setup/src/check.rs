@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use vigil_cycle::service;
+use vigil_pomdp::{PointBased, Pomdp};
 use vigil_robot::channel_model::AXES;
 use vigil_robot::channel_model::component::unfit;
 use vigil_robot::description::{Kinematics, Limits};
@@ -13,6 +14,7 @@ use vigil_robot::{AlarmError, Description, RobotModel, declared};
 use crate::graph_file::{GraphFile, Socket, Source};
 
 mod navigation;
+mod planning;
 mod supervisor;
 
 /// Largest length of a graph's name: it is part of shared-memory and socket names.
@@ -39,6 +41,17 @@ pub(crate) fn graph(
     drive(file, robot, &mut report);
     navigation::check(file, robot, &mut report);
     supervisor::check(file, &mut report);
+}
+
+/// What a planner spends on a decision model; `report` gets the key and a message if that is more
+/// than a cycle has time for.
+pub(crate) fn planning(
+    file: &GraphFile,
+    model: &Pomdp,
+    solved: Option<&PointBased>,
+    report: impl FnOnce(&str, String),
+) {
+    planning::check(&file.supervisor, model, solved, report);
 }
 
 fn services(file: &GraphFile, report: &mut impl FnMut(&str, String)) {

@@ -130,6 +130,12 @@ impl Document {
                 Err(message) => problems.push(at("supervisor.policy_file", message)),
             }
         }
+        if let (Some(decision), true) = (&decision, problems.is_empty()) {
+            let solved = solved.as_ref().map(|(policy, _)| policy);
+            check::planning(file, decision, solved, |key, message| {
+                problems.push(at(key, message));
+            });
+        }
         let (Some(robot), Some(tree), Some(model), Some(decision), true) =
             (robot, tree, model, decision, problems.is_empty())
         else {

@@ -9,6 +9,7 @@ mod decisions;
 mod exceptions;
 mod hardware;
 mod navigation;
+mod planning;
 mod policies;
 mod sight;
 mod solved;

@@ -223,6 +223,6 @@ fn files_that_do_not_fit_are_refused_with_line_key_and_reason() {
     let message = load_graph(&config().join("rover.toml"), change)
         .err()
         .unwrap();
-    let part = "policy_file: has a meaning only with supervisor.policy = \"point-based\"";
+    let part = "policy_file: has a meaning only with supervisor.policy = \"point-based\" or";
     assert!(message.to_string().contains(part), "{message}");
 }

@@ -58,14 +58,12 @@ impl Rows {
     }
 
     /// Most entries of a row.
-    #[cfg(feature = "solver")]
     pub(super) fn longest(&self) -> usize {
         let rows = 0..self.ends.len();
         rows.map(|row| self.row(row).len()).fold(0, usize::max)
     }
 
     /// Largest sum of a row: 1 but for the tolerance of the reader.
-    #[cfg(feature = "solver")]
     pub(super) fn sum_max(&self) -> f64 {
         (0..self.ends.len())
             .map(|row| self.row(row).iter().map(|(_, w)| w).sum())

@@ -13,7 +13,6 @@
 //! nothing. What is left of their error is accounted for: added to upper bounds, taken from lower
 //! ones; of [`mdp`], whose values serve policies as they are, [`mdp::Solution::error`] says it.
 
-#[cfg(feature = "solver")]
 pub mod blind;
 pub mod fib;
 mod informed;

@@ -85,6 +85,11 @@ impl Decider {
         }
     }
 
+    /// Spends a share of spare time on `belief`; what is known of the last decision stands.
+    pub fn improve(&mut self, belief: &[f64]) {
+        self.policy.improve(belief);
+    }
+
     /// What the policy thinks of every action, as of the last decision: values or votes, the
     /// larger the better; in a step for information the expected entropies, negative.
     #[must_use]

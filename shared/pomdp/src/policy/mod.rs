@@ -7,6 +7,7 @@
 //! | `qmdp` | [`QMdp`]: argmax_a sum_s b(s) Q_CO(s,a) |
 //! | `point-based` | [`PointBased`]: the action of argmax_alpha alpha . b, solved beforehand |
 //! | `fib` | [`FastInformed`]: argmax_a b . q_a, q from the fast informed bound |
+//! | `despot` | [`Despot`]: the first action of the best plan that a search has found so far |
 //! | `dm-X`, `adm-X` | [`DualControl`]: X while the belief is certain enough, else information |
 //!
 //! pi_CO and Q_CO are those of the fully observable relaxation, [`crate::mdp`].
@@ -22,6 +23,7 @@
 
 mod completion;
 mod decider;
+mod despot;
 mod dual;
 mod entropy;
 mod fast_informed;
@@ -33,6 +35,7 @@ mod qmdp;
 mod voting;
 
 pub use decider::{Decider, Decision};
+pub use despot::{Despot, DespotError, DespotOptions};
 pub use dual::{Dual, DualControl, DualError, Gate, Information};
 pub use entropy::normalised_entropy;
 pub use fast_informed::FastInformed;
@@ -88,6 +91,10 @@ pub trait Policy: Send {
     fn measure(&self) -> Measure {
         Measure::Value
     }
+
+    /// Spends a share of spare time on `belief`: later decisions about it may be better. Allocates
+    /// nothing; most policies have nothing to improve.
+    fn improve(&mut self, _belief: &[f64]) {}
 
     /// Forgets what it remembers of earlier decisions: a new mission begins.
     fn reset(&mut self) {}

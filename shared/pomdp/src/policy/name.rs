@@ -4,8 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::{
-    ActionVoting, Decider, Dual, DualControl, DualError, FastInformed, Information,
-    MostLikelyState, PointBased, Policy, QMdp,
+    ActionVoting, Decider, Despot, DespotError, DespotOptions, Dual, DualControl, DualError,
+    FastInformed, Information, MostLikelyState, PointBased, Policy, QMdp,
 };
 use crate::bounds::mdp::Solution;
 use crate::bounds::{SolveError, fib};
@@ -71,6 +71,9 @@ pub enum BuildError {
     /// The settings of dual control are refused.
     #[error(transparent)]
     Dual(#[from] DualError),
+    /// The settings of a search are refused.
+    #[error(transparent)]
+    Despot(#[from] DespotError),
     /// Its values cannot be found.
     #[error(transparent)]
     Solve(#[from] SolveError),
@@ -81,23 +84,29 @@ pub enum BuildError {
 
 /// The name of a policy that was solved beforehand.
 const POINT_BASED: &str = "point-based";
+/// The name of a policy that plans while it decides.
+const DESPOT: &str = "despot";
 
-/// Any policy by name: a heuristic, which follows from the model, or one solved beforehand.
+/// Any policy by name: a heuristic, which follows from the model, one solved beforehand, or one
+/// that plans while it decides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PolicyKind {
     /// `X`, `dm-X` or `adm-X`.
     Heuristic(PolicyName),
     /// `point-based`.
     PointBased,
+    /// `despot`.
+    Despot,
 }
 
 /// A name that no policy has, solved ones included.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}, and {POINT_BASED}")]
+#[error("{0}, {DESPOT}, and {POINT_BASED}")]
 pub struct KindError(NameError);
 
 impl PolicyKind {
-    /// The decider for a model: as [`PolicyName::build`], or around `solved`.
+    /// The decider for a model: as [`PolicyName::build`], around `solved`, or a search by `options`
+    /// that may end with what is `solved`.
     ///
     /// # Errors
     /// [`BuildError`].
@@ -107,8 +116,13 @@ impl PolicyKind {
         solution: &Solution,
         settings: impl FnOnce(Information) -> Dual,
         solved: Option<&PointBased>,
+        options: &DespotOptions,
     ) -> Result<Decider, BuildError> {
         match self {
+            Self::Despot => {
+                let policy = Despot::new(model, solution, solved, options)?;
+                Ok(Decider::new(Box::new(policy), model, solution))
+            }
             Self::Heuristic(name) => name.build(model, solution, settings),
             Self::PointBased => {
                 let policy = solved.ok_or(BuildError::Unsolved)?.clone();
@@ -128,10 +142,11 @@ impl FromStr for PolicyKind {
     type Err = KindError;
 
     fn from_str(name: &str) -> Result<Self, KindError> {
-        if name == POINT_BASED {
-            return Ok(Self::PointBased);
+        match name {
+            POINT_BASED => Ok(Self::PointBased),
+            DESPOT => Ok(Self::Despot),
+            name => name.parse().map(Self::Heuristic).map_err(KindError),
         }
-        name.parse().map(Self::Heuristic).map_err(KindError)
     }
 }
 
@@ -140,6 +155,7 @@ impl fmt::Display for PolicyKind {
         match self {
             Self::Heuristic(name) => name.fmt(f),
             Self::PointBased => f.write_str(POINT_BASED),
+            Self::Despot => f.write_str(DESPOT),
         }
     }
 }

@@ -50,6 +50,16 @@ impl PointBased {
     pub const fn products(&self) -> usize {
         self.columns.len()
     }
+
+    /// The action of each vector.
+    pub(in crate::policy) fn first_actions(&self) -> &[usize] {
+        &self.actions
+    }
+
+    /// The values of all vectors in a state.
+    pub(in crate::policy) fn column(&self, state: usize) -> &[f64] {
+        &self.columns[state * self.actions.len()..][..self.actions.len()]
+    }
 }
 
 impl Policy for PointBased {

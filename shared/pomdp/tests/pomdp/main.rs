@@ -4,6 +4,7 @@
 
 mod belief;
 mod bounds;
+mod despot;
 mod dual;
 mod examples;
 mod grammar;

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use vigil_pomdp::policy::{Measure, PolicyKind};
+use vigil_pomdp::policy::{DespotOptions, Measure, PolicyKind};
 use vigil_pomdp::solver::{Options, solve};
 use vigil_pomdp::{AlphaVectors, Budget, PointBased, Policy, Pomdp, mdp};
 
@@ -112,7 +112,8 @@ fn the_policy_goes_by_its_name_and_needs_its_vectors() {
         (kind.to_string(), kind.is_dual()),
         ("point-based".into(), false)
     );
-    let build = |solved| kind.build(&model, &solution, |_| unreachable!(), solved);
+    let options = DespotOptions::default();
+    let build = |solved| kind.build(&model, &solution, |_| unreachable!(), solved, &options);
     let error = build(None).err().unwrap().to_string();
     assert!(error.contains("solved beforehand"), "{error}");
     let policy = PointBased::new(&model, &solved(&model, 1e-6)).unwrap();
@@ -124,7 +125,10 @@ fn the_policy_goes_by_its_name_and_needs_its_vectors() {
         .parse::<PolicyKind>()
         .unwrap_err()
         .to_string();
-    assert!(wrong.ends_with("adm-X of each, and point-based"), "{wrong}");
+    assert!(
+        wrong.ends_with("adm-X of each, despot, and point-based"),
+        "{wrong}"
+    );
 }
 
 proptest! {

@@ -117,7 +117,8 @@ fn policy(settings: &Settings, report: &mut impl FnMut(&str, String)) {
             report("supervisor.policy", message.to_owned());
         }
         (PolicyKind::Heuristic(_), Some(_)) => {
-            let message = "has a meaning only with supervisor.policy = \"point-based\"";
+            let message = "has a meaning only with supervisor.policy = \"point-based\" or \
+                           \"despot\"";
             report("supervisor.policy_file", message.to_owned());
         }
         _ => {}

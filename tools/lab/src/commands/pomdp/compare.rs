@@ -14,6 +14,7 @@ use vigil_pomdp::policy::{Gate, PolicyKind};
 use vigil_pomdp::{PointBased, Pomdp, mdp};
 
 use super::escalation::EscalationArgs;
+use super::planner::PlannerArgs;
 use super::{load, print, solved};
 use contest::{Contest, Setting};
 use contestant::{Contestant, Kind, Knowledge};
@@ -22,10 +23,10 @@ use vigil_terminal::{CommandError, Outcome};
 /// Compares policies of a decision model over the same random missions.
 ///
 /// Every policy meets the same random numbers at the same step of the same mission. The policies
-/// are mls, av, qmdp, fib, random, point-based (with --policy-file) and escalation-N. The dual
-/// controls dm-X and adm-X of the first four gather information while the entropy (0 to 1) is above
-/// a threshold K; each runs with each threshold. escalation-N takes the next action of --ladder
-/// after N symptoms in a row.
+/// are mls, av, qmdp, fib, random, despot, point-based (with --policy-file) and escalation-N. The
+/// dual controls dm-X and adm-X of the first four gather information while the entropy (0 to 1) is
+/// above a threshold K; each runs with each threshold. escalation-N takes the next action of
+/// --ladder after N symptoms in a row.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model (.pomdp or .pomdpx).
@@ -74,11 +75,14 @@ pub struct Args {
     /// and the point-based solver's after a fixed number of steps, about half a second].
     #[arg(long, allow_negative_numbers = true)]
     upper: Option<f64>,
-    /// Policy file for `point-based`, as `vigil pomdp solve FILE --out POLICY` writes it.
+    /// Policy file for `point-based`, as `vigil pomdp solve FILE --out POLICY` writes it; plans
+    /// that `despot` may end with.
     #[arg(long, value_name = "POLICY")]
     policy_file: Option<PathBuf>,
     #[command(flatten)]
     escalation: EscalationArgs,
+    #[command(flatten)]
+    planner: PlannerArgs,
     /// Print one JSON document.
     #[arg(long, action = ArgAction::SetTrue)]
     json: bool,
@@ -132,6 +136,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             GateName::Action => Gate::Action,
         }),
         escalation: &args.escalation,
+        planner: args.planner.options(),
         solved: solved_by(&model, args.policy_file.as_deref(), &contestants)?,
     };
     let contest = Contest::hold(&setting, &knowledge, &contestants)?;
@@ -143,7 +148,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     Ok(Outcome::Done)
 }
 
-/// The policy in `file`, if one of `contestants` is decided by it.
+/// The policy in `file`, if one of `contestants` is decided by it or plans with it.
 ///
 /// # Errors
 /// A file without that policy, that policy without a file, a file that is refused.
@@ -152,14 +157,15 @@ pub(super) fn solved_by(
     file: Option<&Path>,
     contestants: &[Contestant],
 ) -> Result<Option<PointBased>, CommandError> {
-    let is_solved = |c: &Contestant| c.kind == Kind::Policy(PolicyKind::PointBased);
-    match (file, contestants.iter().any(is_solved)) {
-        (Some(file), true) => solved::load(model, "--policy-file", file).map(Some),
-        (None, false) => Ok(None),
-        (Some(_), false) => Err(CommandError::usage(
-            "--policy-file: has a meaning only with the policy point-based",
+    let has = |kind| contestants.iter().any(|c| c.kind == Kind::Policy(kind));
+    let (needed, used) = (has(PolicyKind::PointBased), has(PolicyKind::Despot));
+    match (file, needed, needed || used) {
+        (Some(file), _, true) => solved::load(model, "--policy-file", file).map(Some),
+        (None, false, _) => Ok(None),
+        (Some(_), _, false) => Err(CommandError::usage(
+            "--policy-file: has a meaning only with the policies point-based and despot",
         )),
-        (None, true) => Err(CommandError::usage(
+        (None, true, _) => Err(CommandError::usage(
             "policy point-based: requires --policy-file",
         )),
     }

@@ -8,6 +8,7 @@ mod info;
 mod learn;
 mod missions;
 mod picture;
+mod planner;
 mod seed;
 mod simulate;
 mod solve;

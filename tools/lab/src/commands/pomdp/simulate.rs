@@ -11,6 +11,7 @@ use vigil_pomdp::mdp;
 use super::compare::contestant::{Contestant, Knowledge};
 use super::compare::{among, count, solved_by};
 use super::escalation::EscalationArgs;
+use super::planner::PlannerArgs;
 use super::{load, missions, seed};
 use vigil_terminal::output::Progress;
 use vigil_terminal::{CommandError, Outcome};
@@ -44,11 +45,14 @@ pub struct Args {
     /// Where to write the missions.
     #[arg(long)]
     out: PathBuf,
-    /// Policy file for `point-based`, as `vigil pomdp solve FILE --out POLICY` writes it.
+    /// Policy file for `point-based`, as `vigil pomdp solve FILE --out POLICY` writes it; plans
+    /// that `despot` may end with.
     #[arg(long, value_name = "POLICY")]
     policy_file: Option<PathBuf>,
     #[command(flatten)]
     escalation: EscalationArgs,
+    #[command(flatten)]
+    planner: PlannerArgs,
 }
 
 /// Runs the command.
@@ -73,6 +77,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         stall_steps: 0,
         gate: None,
         escalation: &args.escalation,
+        planner: args.planner.options(),
         solved: solved_by(&model, args.policy_file.as_deref(), &contestants)?,
     };
     let mut agent = contestant.build(&knowledge)?;

@@ -2,7 +2,7 @@
 
 use vigil_missions::simulation::{Agent, PolicyAgent, Random};
 use vigil_pomdp::mdp::Solution;
-use vigil_pomdp::policy::{Dual, Gate, Information, PolicyKind};
+use vigil_pomdp::policy::{DespotOptions, Dual, Gate, Information, PolicyKind};
 use vigil_pomdp::{PointBased, Pomdp};
 
 use crate::commands::pomdp::escalation::EscalationArgs;
@@ -45,7 +45,9 @@ pub struct Knowledge<'a> {
     pub gate: Option<Gate>,
     /// What the escalation does.
     pub escalation: &'a EscalationArgs,
-    /// What point-based decides by.
+    /// What despot may spend.
+    pub planner: DespotOptions,
+    /// What point-based decides by, and despot may end with.
     pub solved: Option<PointBased>,
 }
 
@@ -118,7 +120,8 @@ impl Contestant {
             Kind::Policy(name) => {
                 let threshold = self.threshold.unwrap_or(1.0);
                 let dual = |information| dual(information, threshold, of);
-                let decider = name.build(of.model, of.solution, dual, of.solved.as_ref());
+                let solved = of.solved.as_ref();
+                let decider = name.build(of.model, of.solution, dual, solved, &of.planner);
                 let decider = decider.map_err(CommandError::usage)?;
                 Box::new(PolicyAgent::new(of.model, decider))
             }

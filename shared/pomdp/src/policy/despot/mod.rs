@@ -1,0 +1,168 @@
+//! DESPOT: a plan for the present belief, searched for while time is left.
+//!
+//! K scenarios of the belief, each a state and a random number for every step to come, make the
+//! future a tree of actions and observations (Somani et al. 2013). Upper bounds of its leaves are
+//! fast informed, lower ones those of plans that are known: to do one thing for ever, or what a
+//! solver has found so far. A search improves both where they matter most for the best action.
+//!
+//! Two things differ from the paper. Every scenario counts after every observation, by its
+//! likelihood (Garg et al. 2019): fewer scenarios do, and none has to be followed by itself.
+//! A trial looks one step further at one leaf, the one with the widest gap that the most promising
+//! actions may lead to (Ross et al. 2008): so its cost is bounded.
+//!
+//! A tree is dropped when the belief moves. What is planned depends on the belief that it began with,
+//! the seed and the number of trials; not on earlier beliefs, and not on a clock.
+
+mod generator;
+mod options;
+mod scenarios;
+mod tree;
+
+pub use options::{DespotError, DespotOptions};
+
+use super::{Choice, PointBased, Policy, choose};
+use crate::bounds::mdp::Solution;
+use crate::model::Pomdp;
+use generator::Generator;
+use scenarios::Scenarios;
+use tree::{Limits, Tree};
+
+/// A plan stands while the belief moves by no more than this, half the sum of absolute differences.
+/// Chosen by hand: far below the error of some hundred scenarios. Larger saves searches; smaller
+/// plans anew for rounding.
+const STANDS: f64 = 1e-3;
+
+/// Plans for one belief after another; all memory is allocated by [`Despot::new`].
+///
+/// The value of an action is its lower bound: what the best plan found that begins with it earns in
+/// the scenarios.
+#[derive(Debug, Clone)]
+pub struct Despot {
+    trials: usize,
+    generator: Generator,
+    scenarios: Scenarios,
+    tree: Tree,
+    /// What the tree is for; nothing before the first decision.
+    belief: Vec<f64>,
+    is_planned: bool,
+    /// True if the search for this belief began with the last decision.
+    is_fresh: bool,
+}
+
+impl Despot {
+    /// For a model, of which `solution` is the fully observable relaxation; `solved` are plans that
+    /// the search may end with.
+    ///
+    /// # Errors
+    /// [`DespotError`].
+    pub fn new(
+        model: &Pomdp,
+        solution: &Solution,
+        solved: Option<&PointBased>,
+        options: &DespotOptions,
+    ) -> Result<Self, DespotError> {
+        let DespotOptions {
+            scenarios,
+            depth,
+            nodes,
+            ..
+        } = *options;
+        options.check()?;
+        let bytes = Tree::bytes(nodes, scenarios);
+        let bytes = bytes.saturating_add(size_of::<f64>() * scenarios * depth);
+        if bytes > options::BYTES_MAX {
+            return Err(DespotError::Memory {
+                nodes,
+                scenarios,
+                bytes,
+            });
+        }
+        let generator = Generator::new(model, solution, solved)?;
+        let limits = Limits {
+            nodes,
+            depth,
+            cost: options.regularisation,
+        };
+        Ok(Self {
+            trials: options.trials,
+            scenarios: Scenarios::new(scenarios, depth, options.seed),
+            tree: Tree::new(&generator, scenarios, limits),
+            belief: vec![0.0; model.states().len()],
+            is_planned: false,
+            is_fresh: false,
+            generator,
+        })
+    }
+
+    /// Goes on with the search for the belief of the last decision. False once there is nothing to
+    /// gain, or no room.
+    pub fn search(&mut self, trials: usize) -> bool {
+        (0..trials).all(|_| self.tree.grow(&self.generator, &mut self.scenarios))
+    }
+
+    /// Lower and upper bound of what the best plan earns in the scenarios; `None` before the first
+    /// decision.
+    #[must_use]
+    pub fn bounds(&self) -> Option<(f64, f64)> {
+        self.tree.root().map(|root| (root.lower, root.upper))
+    }
+
+    /// As [`Self::bounds`], of plans that begin with an action; `None` also before the first trial.
+    #[must_use]
+    pub fn action_bounds(&self, action: usize) -> Option<(f64, f64)> {
+        let bracket = self.tree.action(action)?;
+        Some((bracket.lower, bracket.upper))
+    }
+
+    /// Begins a tree for `belief`, unless the one that there is will do; true if it did.
+    fn plan(&mut self, belief: &[f64]) -> bool {
+        let moves = belief.iter().zip(&self.belief).map(|(a, b)| (a - b).abs());
+        if self.is_planned && 0.5 * moves.sum::<f64>() <= STANDS {
+            return false;
+        }
+        self.belief.fill(0.0);
+        for (ours, b) in self.belief.iter_mut().zip(belief) {
+            *ours = *b;
+        }
+        self.scenarios.draw(&self.belief);
+        self.tree.plant(&self.generator, &self.scenarios);
+        self.is_planned = true;
+        self.search(self.trials);
+        true
+    }
+}
+
+impl Policy for Despot {
+    fn evaluate(&mut self, belief: &[f64], values: &mut [f64]) -> Choice {
+        self.is_fresh |= self.plan(belief);
+        for (action, value) in values.iter_mut().enumerate() {
+            let bracket = self.tree.action(action);
+            *value = bracket.map_or(f64::NEG_INFINITY, |bracket| bracket.lower);
+        }
+        // Plans without a search: no node, no cost.
+        let actions = self.generator.actions;
+        for (plan, action) in self.generator.plans().iter().enumerate() {
+            let states = self.scenarios.states().iter();
+            let weighted = states.zip(self.scenarios.weights());
+            let worth: f64 = weighted
+                .map(|(state, weight)| weight * self.generator.bounds(*state)[actions + plan])
+                .sum();
+            if let Some(value) = values.get_mut(*action as usize) {
+                *value = value.max(worth);
+            }
+        }
+        choose(values)
+    }
+
+    fn improve(&mut self, belief: &[f64]) {
+        // A belief that is new to this decision has had its share.
+        if !std::mem::take(&mut self.is_fresh) && !self.plan(belief) {
+            self.search(self.trials);
+        }
+    }
+
+    fn reset(&mut self) {
+        self.is_planned = false;
+        self.is_fresh = false;
+    }
+}
