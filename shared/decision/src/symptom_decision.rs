@@ -227,7 +227,8 @@ impl SymptomDecision {
             && !hardware.allows(best.action)
         {
             let values = process.worth.values(&process.decider, belief);
-            best = choose_among(values, |action| hardware.allows(action));
+            let votes = process.decider.votes();
+            best = choose_among(values, votes, |action| hardware.allows(action));
         }
         let actions = &process.actions;
         let kind = |action: usize| actions.get(action).map_or(RecoveryKind::Stop, |m| m.kind);

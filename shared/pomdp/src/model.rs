@@ -1,15 +1,15 @@
 //! A POMDP in the form that tracking and deciding need: sparse transitions, dense columns of Z.
 
 mod build;
+mod distribution;
 mod hash;
 mod joint;
 pub(crate) mod rewards;
 pub(crate) mod sparse;
 
+pub(crate) use build::Parts;
 pub use build::Probabilities;
-#[cfg(feature = "solver")]
-pub(crate) use build::ROW_SUM_WARNING;
-pub(crate) use build::{Parts, ROW_SUM_TOLERANCE, refuse_sum};
+pub(crate) use distribution::{RowSum, SUM_TOLERANCE, check_probability};
 
 use crate::parse_error::Position;
 use joint::Joint;
@@ -96,7 +96,7 @@ impl Pomdp {
         self.is_cost
     }
 
-    /// Start belief, as the file gives it: its sum may be off 1 by up to 1e-5.
+    /// Start belief.
     #[must_use]
     pub fn start(&self) -> &[f64] {
         &self.start

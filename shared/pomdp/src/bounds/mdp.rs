@@ -30,6 +30,18 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// How many states.
+    #[must_use]
+    pub const fn states(&self) -> usize {
+        self.states
+    }
+
+    /// How many actions.
+    #[must_use]
+    pub fn actions(&self) -> usize {
+        self.q.len() / self.states.max(1)
+    }
+
     /// Q_CO(s,a).
     #[must_use]
     pub fn q(&self, state: usize, action: usize) -> f64 {

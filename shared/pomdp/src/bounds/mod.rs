@@ -68,6 +68,11 @@ impl ActionValues {
         &self.values[action * self.states..][..self.states]
     }
 
+    /// How many states.
+    pub(crate) const fn states(&self) -> usize {
+        self.states
+    }
+
     /// max_a sum_s b(s) q_a(s).
     #[must_use]
     pub fn value(&self, belief: &[f64]) -> f64 {
@@ -89,7 +94,7 @@ pub enum SolveError {
     /// The discount, and the sum of a row that grows faster than it shrinks.
     #[error(
         "with discount {0} the values are not bounded, as a row of T, or of T and O together, sums \
-         to {1}; allowed are sums below {max:.9}", max = 1.0 / .0
+         to {1}; allowed are sums below {max:.12}", max = 1.0 / .0
     )]
     Mass(f64, f64),
     /// A linear system that iteration does not solve, too large for a dense solve.

@@ -5,7 +5,7 @@ use crate::alpha_vectors::AlphaVectors;
 use crate::bounds::tib::{self, Tib};
 use crate::bounds::{ActionValues, SolveError, blind, fib};
 use crate::budget::Budget;
-use crate::model::{Pomdp, ROW_SUM_TOLERANCE, ROW_SUM_WARNING};
+use crate::model::{Pomdp, SUM_TOLERANCE};
 use crate::sparse_beliefs::MERGED;
 
 /// What the budget allowed.
@@ -96,16 +96,11 @@ pub(super) fn trivial(model: &Pomdp) -> Bracket {
         least = least.min(reward);
         most = most.max(reward);
     }
-    let off = if model.warnings().is_empty() {
-        ROW_SUM_WARNING
-    } else {
-        ROW_SUM_TOLERANCE
-    };
     // Mass that is gained or lost in a step, whichever makes the bracket wider: a row of T and one
     // of Z may each be off, and their product by a little more than the sum.
     let for_ever = |reward: f64, outward: f64| {
         let sign = outward * reward.signum();
-        let discount = model.discount() * (1.0 + sign * 2.1 * off);
+        let discount = model.discount() * (1.0 + sign * 2.1 * SUM_TOLERANCE);
         if discount < 1.0 {
             reward / (1.0 - discount)
         } else {
