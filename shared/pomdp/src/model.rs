@@ -2,6 +2,7 @@
 
 mod build;
 mod distribution;
+mod goals;
 mod hash;
 mod joint;
 pub(crate) mod rewards;
@@ -12,6 +13,7 @@ pub use build::Probabilities;
 pub(crate) use distribution::{RowSum, SUM_TOLERANCE, check_probability};
 
 use crate::parse_error::Position;
+use goals::Goals;
 use joint::Joint;
 use rewards::Rewards;
 use sparse::Sparse;
@@ -43,6 +45,8 @@ pub struct Pomdp {
     rewards: Rewards,
     /// R[a][s], expected.
     reward: Vec<f64>,
+    /// With discount 1.
+    goals: Option<Goals>,
     /// T and Z in one, unless that is too large.
     joint: Option<Joint>,
     hash: u64,
@@ -126,6 +130,27 @@ impl Pomdp {
     #[must_use]
     pub fn successors(&self, state: usize, action: usize) -> &[(usize, f64)] {
         self.transitions[action].row(state)
+    }
+
+    /// True if the discount is 1 and nothing is earned from this state on, whatever is done: it
+    /// belongs to a set of states without rewards that no action leaves.
+    #[must_use]
+    pub fn is_goal(&self, state: usize) -> bool {
+        let goals = self.goals.as_ref();
+        goals.is_some_and(|goals| goals.is_goal[state])
+    }
+
+    /// Successors after which something may still be earned: all, but for goals.
+    pub(crate) fn moves(&self, state: usize, action: usize) -> &[(usize, f64)] {
+        match &self.goals {
+            Some(goals) => goals.moves[action].row(state),
+            None => self.successors(state, action),
+        }
+    }
+
+    /// True if a goal may be reached in one step, or has been.
+    pub(crate) fn may_end(&self, state: usize, action: usize) -> bool {
+        self.moves(state, action).len() < self.successors(state, action).len()
     }
 
     /// Z(a,s',z) for every s'.

@@ -76,7 +76,7 @@ impl Steps {
         let mut belief = Vec::new();
         for s in 0..model.states().len() {
             for a in 0..actions {
-                let successors = model.successors(s, a);
+                let successors = model.moves(s, a);
                 for o in 0..observations {
                     budget.spend(4 * successors.len())?;
                     let likelihood = model.likelihood(a, o);
@@ -142,7 +142,8 @@ impl Steps {
                     }
                 }
                 let rewards = belief.iter().map(|(s, b)| b * model.reward(*s as usize, a));
-                mixtures.end_pair(count, rewards.sum());
+                let may_end = belief.iter().any(|(s, _)| model.may_end(*s as usize, a));
+                mixtures.end_pair(count, rewards.sum(), may_end);
             }
         }
         Ok(mixtures)
@@ -188,7 +189,9 @@ pub fn solve_from(
             for next in 0..actions {
                 table.extend((0..n).map(|s| {
                     let (to, p) = steps.successors(s, a)[o];
-                    model.discount() * p * q[to as usize * actions + next]
+                    // Without any step that goes on there is no belief at all.
+                    let worth = q.get(to as usize * actions + next).unwrap_or(&0.0);
+                    model.discount() * p * worth
                 }));
             }
         }

@@ -1,6 +1,7 @@
 //! From what a reader has collected to a model: rows are checked, expected rewards computed.
 
 use super::distribution::{RowSum, SUM_TOLERANCE, check_probability};
+use super::goals::Goals;
 use super::hash::hash;
 use super::joint::Joint;
 use super::rewards::Rewards;
@@ -107,6 +108,7 @@ impl Pomdp {
             let message = format!("{} overflows", parts.row_name("R", row / n, row % n));
             return Err(ParseError::new(parts.start_at, message));
         }
+        let goals = (parts.discount >= 1.0).then(|| Goals::new(&parts.transitions, &reward, n));
         let joint = Joint::new(&parts.transitions, &parts.observation, n);
         let mut model = Self {
             discount: parts.discount,
@@ -119,6 +121,7 @@ impl Pomdp {
             observation: parts.observation,
             rewards: parts.rewards,
             reward,
+            goals,
             joint,
             hash: 0,
             warnings,

@@ -25,7 +25,7 @@ pub(super) struct Alphas {
 }
 
 impl Alphas {
-    /// Begins with the blind policies.
+    /// Begins with the blind policies. With discount 1 what they go on with is a lot, of all of them.
     pub(super) fn new(blind: &ActionValues, states: usize, observations: usize) -> Self {
         let mut alphas = Self {
             states,

@@ -134,7 +134,7 @@ impl Tree<'_> {
         }
         (0..states)
             .map(|s| {
-                let next = model.successors(s, action).iter();
+                let next = model.moves(s, action).iter();
                 let next: f64 = next.map(|(to, p)| p * seen[*to]).sum();
                 model.reward(s, action) + model.discount() * next
             })

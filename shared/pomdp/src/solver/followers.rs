@@ -30,7 +30,7 @@ impl Followers {
         self.predicted.resize(model.states().len(), 0.0);
         let mut work = self.predicted.len() * (1 + model.observations().len());
         for (s, b) in belief {
-            let successors = model.successors(*s as usize, action);
+            let successors = model.moves(*s as usize, action);
             work += successors.len();
             for (to, p) in successors {
                 self.predicted[*to] += b * p;

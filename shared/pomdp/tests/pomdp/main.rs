@@ -5,6 +5,7 @@
 mod belief;
 mod bounds;
 mod dual;
+mod goals;
 mod grammar;
 mod hostile;
 mod inspection;
