@@ -130,7 +130,7 @@ impl<'m> Choice<'m> {
             scale: values.fold(0.0, |most, value| most.max(value.abs())),
             plans,
             kept: Vec::new(),
-            followers: Followers::default(),
+            followers: Followers::new(model),
         }
     }
 

@@ -91,7 +91,8 @@ impl Tree<'_> {
                 })
                 .collect();
             let alpha = &values[part * states..][..states];
-            let origin = Some(controller.parts[part]);
+            let id = controller.parts[part];
+            let origin = (Some(id), self.beliefs.entries(id));
             self.alphas
                 .push(origin, controller.actions[part], alpha, &successors);
         }

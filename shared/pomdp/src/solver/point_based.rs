@@ -1,6 +1,7 @@
 //! The search from beginning to end.
 
 use super::alphas::Alphas;
+use super::blocks::Blocks;
 use super::initial::{self, Initial};
 use super::report::{Bracket, EndReason, Options, Progress, SearchResult};
 use super::sawtooth::Sawtooth;
@@ -45,8 +46,9 @@ pub fn solve(
         return Ok(found);
     };
     let states = model.states().len();
-    let alphas = Alphas::new(blind, states, model.observations().len());
-    let sawtooth = Sawtooth::new(fast.clone(), initial.corners(states));
+    let blocks = Blocks::new(model);
+    let alphas = Alphas::new(blind, states, model.observations().len(), blocks.clone());
+    let sawtooth = Sawtooth::new(fast.clone(), initial.corners(states), blocks);
     let tree = Tree::new(model, initial.tighter.as_ref(), alphas, sawtooth);
     let rounding = match initial.rounding(model, found.bracket.lower, budget) {
         Err(SolveError::Stopped) => return Ok(found),

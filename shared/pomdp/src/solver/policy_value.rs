@@ -124,7 +124,7 @@ impl Walk {
         budget: &mut Budget<'_>,
     ) -> Result<Self, SolveError> {
         let mut walk = Self::default();
-        let mut followers = Followers::default();
+        let mut followers = Followers::new(model);
         let root = walk.store.intern(&sparse(model.start()));
         walk.place.push(None);
         let mut values = vec![0.0; model.actions().len()];
