@@ -1,17 +1,19 @@
 //! A POMDP in the form that tracking and deciding need: sparse transitions, dense columns of Z.
 
 mod build;
+mod distribution;
+mod goals;
 mod hash;
 mod joint;
 pub(crate) mod rewards;
 pub(crate) mod sparse;
 
+pub(crate) use build::Parts;
 pub use build::Probabilities;
-#[cfg(feature = "solver")]
-pub(crate) use build::ROW_SUM_WARNING;
-pub(crate) use build::{Parts, ROW_SUM_TOLERANCE, refuse_sum};
+pub(crate) use distribution::{RowSum, SUM_TOLERANCE, check_probability};
 
 use crate::parse_error::Position;
+use goals::Goals;
 use joint::Joint;
 use rewards::Rewards;
 use sparse::Sparse;
@@ -45,6 +47,8 @@ pub struct Pomdp {
     rewards: Rewards,
     /// R[a][s], expected.
     reward: Vec<f64>,
+    /// With discount 1.
+    goals: Option<Goals>,
     /// T and Z in one, unless that is too large.
     joint: Option<Joint>,
     hash: u64,
@@ -98,8 +102,7 @@ impl Pomdp {
         self.is_cost
     }
 
-    /// Start belief, one probability a state, as the file gives it: its sum may be off 1 by up to
-    /// 1e-5.
+    /// Start belief, one probability a state.
     #[must_use]
     pub fn start(&self) -> &[f64] {
         &self.start
@@ -129,6 +132,27 @@ impl Pomdp {
     #[must_use]
     pub fn successors(&self, state: usize, action: usize) -> &[(usize, f64)] {
         self.transitions[action].row(state)
+    }
+
+    /// True if the discount is 1 and nothing is earned from this state on, whatever is done: it
+    /// belongs to a set of states without rewards that no action leaves.
+    #[must_use]
+    pub fn is_goal(&self, state: usize) -> bool {
+        let goals = self.goals.as_ref();
+        goals.is_some_and(|goals| goals.is_goal[state])
+    }
+
+    /// Successors after which something may still be earned: all, but for goals.
+    pub(crate) fn moves(&self, state: usize, action: usize) -> &[(usize, f64)] {
+        match &self.goals {
+            Some(goals) => goals.moves[action].row(state),
+            None => self.successors(state, action),
+        }
+    }
+
+    /// True if a goal may be reached in one step, or has been.
+    pub(crate) fn may_end(&self, state: usize, action: usize) -> bool {
+        self.moves(state, action).len() < self.successors(state, action).len()
     }
 
     /// Z(a,s',z) for every s': the probability of the observation in each state that is reached.

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use crate::model::rewards::{Block, BlockSize, Rewards};
 use crate::model::sparse::Sparse;
-use crate::model::{Parts, Pomdp, ROW_SUM_TOLERANCE};
+use crate::model::{Parts, Pomdp, RowSum, check_probability};
 use crate::parse_error::Position;
 use crate::reader::is_reserved;
 
@@ -232,17 +232,11 @@ fn dense(
     };
     let mut row = vec![0.0; width];
     for (at, p) in entries {
-        if !(0.0..=1.0 + ROW_SUM_TOLERANCE).contains(&p) {
-            return Err(wrong(format!("{p} is no probability, allowed is 0 to 1")));
-        }
+        check_probability(p).map_err(wrong)?;
         let place = row.get_mut(at);
         let missing = || wrong(format!("index {at}, allowed is 0 to {}", width - 1));
         *place.ok_or_else(missing)? += p;
     }
-    let sum: f64 = row.iter().sum();
-    if (sum - 1.0).abs() > ROW_SUM_TOLERANCE {
-        let allowed = format!("allowed is 1 within {ROW_SUM_TOLERANCE}");
-        return Err(wrong(format!("sums to {sum}, not to 1; {allowed}")));
-    }
+    RowSum::new(row.iter().sum()).map_err(wrong)?;
     Ok(row)
 }

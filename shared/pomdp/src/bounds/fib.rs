@@ -29,7 +29,7 @@ pub fn solve_from(
     let (mut guess, mut entries) = (Vec::with_capacity(n * actions), 0);
     for s in 0..n {
         for a in 0..actions {
-            let successors = model.successors(s, a);
+            let successors = model.moves(s, a);
             let mut count = 0;
             for o in 0..model.observations().len() {
                 budget.spend(successors.len())?;
@@ -50,7 +50,7 @@ pub fn solve_from(
             if entries > ENTRIES_MAX {
                 return Err(SolveError::Entries(entries));
             }
-            mixtures.end_pair(count, model.reward(s, a));
+            mixtures.end_pair(count, model.reward(s, a), model.may_end(s, a));
             guess.push(relaxed.q(s, a));
         }
     }

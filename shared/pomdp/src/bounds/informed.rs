@@ -6,7 +6,7 @@
 //! informed bound, E = beliefs one step from the corners the tighter informed bound.
 
 use super::linear::{Rows, System, largest};
-use super::{SolveError, contraction, rounding};
+use super::{SolveError, contraction, rounding, slacks};
 use crate::budget::Budget;
 
 /// Largest number of table entries (16 bytes each): 320 MB. Beyond it the bound is refused.
@@ -28,6 +28,14 @@ pub(super) struct Mixtures {
     ends: Vec<usize>,
     /// R(e,a).
     rewards: Vec<f64>,
+    /// Whether (e,a) may end at a goal.
+    may_end: Vec<bool>,
+}
+
+/// What a step of policy iteration counts: with discount 1 also a bonus.
+struct Step {
+    discount: f64,
+    bonus: f64,
 }
 
 impl Mixtures {
@@ -44,7 +52,8 @@ impl Mixtures {
     }
 
     /// Ends the rows of (e, a), of which there were `count`.
-    pub(super) fn end_pair(&mut self, count: usize, reward: f64) {
+    pub(super) fn end_pair(&mut self, count: usize, reward: f64, may_end: bool) {
+        self.may_end.push(may_end);
         let first = self.ends.last().copied().unwrap_or(0);
         self.ends.push(first + count);
         self.rewards.push(reward);
@@ -84,22 +93,70 @@ impl Mixtures {
         discount: f64,
         budget: &mut Budget<'_>,
     ) -> Result<Vec<f64>, SolveError> {
-        let pairs = self.rewards.len();
         let mut held = vec![0; self.ends.last().copied().unwrap_or(0)];
-        for round in 0..ROUNDS_MAX {
-            let margin = IMPROVEMENT_MIN * largest(&q) * f64::from(u8::from(round > 0));
-            let mut is_changed = round == 0;
-            for (row, held) in held.iter_mut().enumerate() {
-                budget.spend(self.rows.row(row).len() * self.actions)?;
-                let action = self.best(row, *held, &q, margin).0;
-                is_changed |= action != *held;
-                *held = action;
+        let step = Step {
+            discount,
+            bonus: 0.0,
+        };
+        self.choose(&mut held, &q, 0.0, budget)?;
+        q = self.improve(q, &mut held, &step, budget)?;
+        if discount < 1.0 {
+            return self.certify(q, &held, discount, budget);
+        }
+        let longest = (0..self.rewards.len()).map(|pair| self.terms(pair)).max();
+        let error = rounding(longest.unwrap_or(0));
+        let scale = largest(&q);
+        for slack in slacks(discount, error) {
+            let step = Step {
+                discount,
+                bonus: slack * scale,
+            };
+            q = self.improve(q, &mut held, &step, budget)?;
+            if self.is_above(&q, &held, error * largest(&q), budget)? {
+                return Ok(q);
             }
-            if !is_changed {
-                break;
+        }
+        Err(SolveError::Unbounded(discount))
+    }
+
+    /// Takes the best a' of every row; true if one has changed.
+    fn choose(
+        &self,
+        held: &mut [usize],
+        q: &[f64],
+        margin: f64,
+        budget: &mut Budget<'_>,
+    ) -> Result<bool, SolveError> {
+        let mut is_changed = false;
+        for (row, held) in held.iter_mut().enumerate() {
+            budget.spend(self.rows.row(row).len() * self.actions)?;
+            let action = self.best(row, *held, q, margin).0;
+            is_changed |= action != *held;
+            *held = action;
+        }
+        Ok(is_changed)
+    }
+
+    /// Policy iteration, from the choices that are held.
+    fn improve(
+        &self,
+        mut q: Vec<f64>,
+        held: &mut [usize],
+        step: &Step,
+        budget: &mut Budget<'_>,
+    ) -> Result<Vec<f64>, SolveError> {
+        let rewards: Vec<f64> = (0..self.rewards.len())
+            .map(|pair| match self.rows_of(pair).is_empty() {
+                true => self.rewards[pair],
+                false => self.rewards[pair] + step.bonus,
+            })
+            .collect();
+        for _ in 0..ROUNDS_MAX {
+            if step.discount >= 1.0 {
+                self.mend(held, budget)?;
             }
             let mut rows = Rows::default();
-            for pair in 0..pairs {
+            for pair in 0..self.rewards.len() {
                 for row in self.rows_of(pair) {
                     for (j, w) in self.rows.row(row) {
                         rows.push(*j as usize * self.actions + held[row], *w);
@@ -109,12 +166,77 @@ impl Mixtures {
             }
             let system = System {
                 rows: &rows,
-                right: &self.rewards,
-                discount,
+                right: &rewards,
+                discount: step.discount,
             };
             q = system.solve_roughly(q, budget)?;
+            let margin = IMPROVEMENT_MIN * largest(&q);
+            if !self.choose(held, &q, margin, budget)? {
+                break;
+            }
         }
-        self.certify(q, &held, discount, budget)
+        Ok(q)
+    }
+
+    /// With discount 1, lets every pair end: rows from which the choices that are held never get
+    /// to a goal take one that gets nearer. So a policy is proper.
+    fn mend(&self, held: &mut [usize], budget: &mut Budget<'_>) -> Result<(), SolveError> {
+        let mut ends = self.may_end.clone();
+        for is_held in [true, false] {
+            let mut is_changed = true;
+            while std::mem::take(&mut is_changed) {
+                for pair in (0..ends.len()).rev().filter(|pair| !self.may_end[*pair]) {
+                    if ends[pair] {
+                        continue;
+                    }
+                    budget.spend(self.terms(pair))?;
+                    let found = self.rows_of(pair).find_map(|row| {
+                        let mut actions = 0..self.actions;
+                        let action = actions.find(|action| {
+                            (!is_held || *action == held[row]) && self.gets_on(row, *action, &ends)
+                        });
+                        action.map(|action| (row, action))
+                    });
+                    if let Some((row, action)) = found {
+                        held[row] = action;
+                        ends[pair] = true;
+                        is_changed = true;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// True if an action after a row may lead to a pair that ends.
+    fn gets_on(&self, row: usize, action: usize, ends: &[bool]) -> bool {
+        let mut next = self.rows.row(row).iter();
+        next.any(|(j, _)| ends[*j as usize * self.actions + action])
+    }
+
+    /// Terms of the backup of a pair.
+    fn terms(&self, pair: usize) -> usize {
+        self.rows_of(pair).map(|row| self.rows.row(row).len()).sum()
+    }
+
+    /// True if no backup exceeds Q, to which it may be off by `error`.
+    fn is_above(
+        &self,
+        q: &[f64],
+        held: &[usize],
+        error: f64,
+        budget: &mut Budget<'_>,
+    ) -> Result<bool, SolveError> {
+        for pair in (0..self.rewards.len()).filter(|pair| !self.rows_of(*pair).is_empty()) {
+            budget.spend(self.terms(pair) * self.actions)?;
+            let next = self
+                .rows_of(pair)
+                .map(|row| self.best(row, held[row], q, 0.0).1);
+            if self.rewards[pair] + next.sum::<f64>() + error > q[pair] {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// The operator contracts by g = discount times the largest mass: Q plus the largest

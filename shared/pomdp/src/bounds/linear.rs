@@ -7,6 +7,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::SolveError;
+#[cfg(feature = "solver")]
+use super::{rounding, slacks};
 use crate::budget::Budget;
 
 /// Up to this size the LU decomposition is taken at once. It decides the time alone: 48 rows take
@@ -57,8 +59,14 @@ impl Rows {
         terms.map(|(column, w)| w * x[*column as usize]).sum()
     }
 
+    /// True if a row has no entry.
+    #[cfg(feature = "solver")]
+    pub(crate) fn is_empty(&self, row: usize) -> bool {
+        self.row(row).is_empty()
+    }
+
     /// Most entries of a row.
-    pub(super) fn longest(&self) -> usize {
+    pub(crate) fn longest(&self) -> usize {
         let rows = 0..self.ends.len();
         rows.map(|row| self.row(row).len()).fold(0, usize::max)
     }
@@ -112,6 +120,49 @@ impl System<'_> {
             }
         }
         self.dense(budget)
+    }
+
+    /// With discount 1, a solution that is certainly no larger than the true one (`outward` -1) or
+    /// no smaller (1): r is moved by ever more, until x is on that side of its own backup. Rows
+    /// without entries keep their r.
+    ///
+    /// # Errors
+    /// [`SolveError`]; `Unbounded` if there is none, as where some rows never come to an end.
+    #[cfg(feature = "solver")]
+    pub(crate) fn solve_beside(
+        &self,
+        outward: f64,
+        mut x: Vec<f64>,
+        budget: &mut Budget<'_>,
+    ) -> Result<Vec<f64>, SolveError> {
+        let mut scale = largest(&x).max(largest(self.right));
+        let error = rounding(self.rows.longest());
+        for slack in slacks(self.discount, error) {
+            let moved = self.right.iter().enumerate();
+            let moved: Vec<f64> = moved
+                .map(|(row, r)| match self.rows.is_empty(row) {
+                    true => *r,
+                    false => r + outward * slack * scale,
+                })
+                .collect();
+            let system = System {
+                right: &moved,
+                ..*self
+            };
+            x = system.solve_roughly(x, budget)?;
+            for (row, value) in x.iter_mut().enumerate() {
+                if self.rows.is_empty(row) {
+                    *value = self.right[row];
+                }
+            }
+            scale = scale.max(largest(&x));
+            let residual = self.residual(&x).into_iter().enumerate();
+            let mut inner = residual.filter(|(row, _)| !self.rows.is_empty(*row));
+            if inner.all(|(_, left)| outward * left <= -4.0 * error * scale) {
+                return Ok(x);
+            }
+        }
+        Err(SolveError::Unbounded(self.discount))
     }
 
     /// r + g P x - x.

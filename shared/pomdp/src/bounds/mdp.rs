@@ -1,11 +1,12 @@
 //! The fully observable relaxation: Q_CO(s,a) by value iteration, finished by policy iteration.
 //!
 //! V(s) = max_a [R(s,a) + gamma sum_s' T(s,a,s') V(s')]. Value iteration alone is hopeless for a
-//! discount near 1; policy iteration is exact in a few rounds.
+//! discount near 1; policy iteration is exact in a few rounds. With discount 1 it begins with a
+//! proper policy, and with any discount below by value iteration.
 
 pub use super::SolveError;
 use super::linear::{Rows, System, largest};
-use super::{contraction, rounding};
+use super::{contraction, proper, rounding, slacks};
 use crate::budget::Budget;
 use crate::model::Pomdp;
 
@@ -19,6 +20,10 @@ const ROUNDS_MAX: usize = 1000;
 /// only loosens the bound.
 const IMPROVEMENT_MIN: f64 = 1e-12;
 
+/// Times that a pay for each step is quartered until no policy gains by never ending.
+#[cfg(feature = "solver")]
+const PAYS: usize = 40;
+
 /// Q_CO and what follows from it, in units of reward.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
@@ -30,6 +35,18 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// How many states.
+    #[must_use]
+    pub const fn states(&self) -> usize {
+        self.states
+    }
+
+    /// How many actions.
+    #[must_use]
+    pub fn actions(&self) -> usize {
+        self.q.len() / self.states.max(1)
+    }
+
     /// Q_CO(s,a).
     #[must_use]
     pub fn q(&self, state: usize, action: usize) -> f64 {
@@ -80,10 +97,48 @@ pub fn solve(model: &Pomdp) -> Result<Solution, SolveError> {
 pub fn solve_within(model: &Pomdp, budget: &mut Budget<'_>) -> Result<Solution, SolveError> {
     let n = model.states().len();
     let (mass_max, longest) = rows(model);
-    let factor = contraction(model.discount(), mass_max)?;
+    let discount = model.discount();
     let mut value = vec![0.0; n];
+    let (policy, factor) = if discount < 1.0 {
+        let factor = contraction(discount, mass_max)?;
+        value = sweeps(model, value, budget)?;
+        ((0..n).map(|s| best(model, &value, s)).collect(), factor)
+    } else {
+        (proper::shortest(model)?, 1.0)
+    };
+    let (policy, value) = improved(model, 0.0, policy, value, budget)?;
+    let q: Vec<f64> = (0..model.actions().len())
+        .flat_map(|a| (0..n).map(move |s| (a, s)))
+        .map(|(a, s)| backup(model, &value, s, a))
+        .collect();
+    // An action that no policy takes may still have a reward beyond all bounds.
+    if q.iter().any(|q| !q.is_finite()) {
+        return Err(SolveError::Unbounded(discount));
+    }
+    let error = if discount < 1.0 {
+        // One backup more, V + excess / (1 - factor) is above its own backup.
+        (excess(model, &value) + rounding(longest) * largest(&q)) / (1.0 - factor)
+    } else {
+        goal_error(model, longest, policy, &value, budget)?
+    };
+    let policy = (0..n).map(|s| lowest_best(&q, n, s)).collect();
+    Ok(Solution {
+        states: n,
+        q,
+        policy,
+        error,
+    })
+}
+
+/// Value iteration.
+fn sweeps(
+    model: &Pomdp,
+    mut value: Vec<f64>,
+    budget: &mut Budget<'_>,
+) -> Result<Vec<f64>, SolveError> {
+    let n = value.len();
     let sweep = (0..model.actions().len())
-        .flat_map(|a| (0..n).map(move |s| model.successors(s, a).len()))
+        .flat_map(|a| (0..n).map(move |s| model.moves(s, a).len()))
         .sum();
     for _ in 0..SWEEPS {
         budget.spend(sweep)?;
@@ -92,9 +147,20 @@ pub fn solve_within(model: &Pomdp, budget: &mut Budget<'_>) -> Result<Solution, 
             .collect();
         value = next;
     }
-    let mut policy: Vec<usize> = (0..n).map(|s| best(model, &value, s)).collect();
+    Ok(value)
+}
+
+/// Policy iteration, with a `bonus` for each step outside the goals. With discount 1 the policy
+/// that it begins with is proper.
+fn improved(
+    model: &Pomdp,
+    bonus: f64,
+    mut policy: Vec<usize>,
+    mut value: Vec<f64>,
+    budget: &mut Budget<'_>,
+) -> Result<(Vec<usize>, Vec<f64>), SolveError> {
     for _ in 0..ROUNDS_MAX {
-        value = evaluate(model, &policy, value, budget)?;
+        value = evaluate(model, &policy, bonus, value, budget)?;
         let scale = value.iter().fold(1.0_f64, |m, v| m.max(v.abs()));
         let mut changed = false;
         for (s, action) in policy.iter_mut().enumerate() {
@@ -108,34 +174,80 @@ pub fn solve_within(model: &Pomdp, budget: &mut Budget<'_>) -> Result<Solution, 
         if !changed {
             break;
         }
+        if model.discount() >= 1.0 {
+            proper::check(model, &policy)?;
+        }
     }
-    let q: Vec<f64> = (0..model.actions().len())
-        .flat_map(|a| (0..n).map(move |s| (a, s)))
-        .map(|(a, s)| backup(model, &value, s, a))
-        .collect();
-    // An action that no policy takes may still have a reward beyond all bounds.
-    if q.iter().any(|q| !q.is_finite()) {
-        return Err(SolveError::Unbounded(model.discount()));
-    }
-    // One backup more, V + excess / (1 - factor) is above its own backup.
-    let excess = (0..n).fold(0.0_f64, |most, s| {
-        let best = best(model, &value, s);
-        most.max(q[best * n + s] - value[s])
-    });
-    let excess = excess + rounding(longest) * largest(&q);
-    let policy = (0..n).map(|s| lowest_best(&q, n, s)).collect();
-    Ok(Solution {
-        states: n,
-        q,
-        policy,
-        error: excess / (1.0 - factor),
+    Ok((policy, value))
+}
+
+/// What a value falls short of its best backup by, at most.
+fn excess(model: &Pomdp, value: &[f64]) -> f64 {
+    value.iter().enumerate().fold(0.0_f64, |most, (s, v)| {
+        most.max(backup(model, value, s, best(model, value, s)) - v)
     })
+}
+
+/// What the true values may exceed `value` by, with discount 1: the difference to values with a
+/// bonus for each step that is larger than what rounding may amount to, as these are certainly no
+/// less than their backup. That no policy gains by never ending is found out on the way.
+fn goal_error(
+    model: &Pomdp,
+    longest: usize,
+    policy: Vec<usize>,
+    value: &[f64],
+    budget: &mut Budget<'_>,
+) -> Result<f64, SolveError> {
+    let scale = value.iter().fold(1.0_f64, |m, v| m.max(v.abs()));
+    let bonus = 4.0 * (IMPROVEMENT_MIN + rounding(longest)) * scale;
+    let (policy, outer) = improved(model, bonus, policy, value.to_vec(), budget)?;
+    let is_above = |above: &[f64]| {
+        let error = rounding(longest) * largest(above);
+        above.iter().enumerate().all(|(s, v)| {
+            model.is_goal(s) || backup(model, above, s, best(model, above, s)) + error <= *v
+        })
+    };
+    // The least that is enough.
+    for bonus in slacks(model.discount(), rounding(longest)).map(|slack| slack * scale) {
+        let above = evaluate(model, &policy, bonus, outer.clone(), budget)?;
+        if is_above(&above) {
+            let differences = above.iter().zip(value).map(|(above, v)| above - v);
+            return Ok(differences.fold(0.0, f64::max));
+        }
+    }
+    Err(SolveError::Unbounded(model.discount()))
+}
+
+/// The most steps that a policy needs which earns at least `lower` at the start belief, about; with
+/// discount 1.
+#[cfg(feature = "solver")]
+pub(crate) fn steps_max(
+    model: &Pomdp,
+    lower: f64,
+    budget: &mut Budget<'_>,
+) -> Result<f64, SolveError> {
+    let rewards = (0..model.states().len())
+        .flat_map(|s| (0..model.actions().len()).map(move |a| model.reward(s, a)));
+    let mut pay = 0.5 * rewards.fold(0.0_f64, |most, reward| most.max(reward.abs()));
+    let policy = proper::shortest(model)?;
+    for _ in 0..PAYS {
+        match improved(model, pay, policy.clone(), vec![0.0; policy.len()], budget) {
+            Ok((_, value)) => {
+                let most: f64 = value.iter().zip(model.start()).map(|(v, b)| v * b).sum();
+                return Ok(((most - lower) / pay).max(1.0));
+            }
+            Err(SolveError::Stopped) => return Err(SolveError::Stopped),
+            // So much pays for never ending.
+            Err(_) => pay /= 4.0,
+        }
+    }
+    Err(SolveError::Unbounded(model.discount()))
 }
 
 /// Largest sum of a row of T, and most entries of one.
 fn rows(model: &Pomdp) -> (f64, usize) {
     let rows = (0..model.actions().len())
-        .flat_map(|a| (0..model.states().len()).map(move |s| model.successors(s, a)));
+        .flat_map(|a| (0..model.states().len()).map(move |s| model.moves(s, a)));
     rows.fold((0.0, 0), |(sum_max, longest), row| {
         let sum: f64 = row.iter().map(|(_, p)| p).sum();
         (f64::max(sum_max, sum), usize::max(longest, row.len()))
@@ -144,11 +256,7 @@ fn rows(model: &Pomdp) -> (f64, usize) {
 
 /// R(s,a) + gamma E V(s').
 fn backup(model: &Pomdp, value: &[f64], s: usize, a: usize) -> f64 {
-    let next: f64 = model
-        .successors(s, a)
-        .iter()
-        .map(|(to, p)| p * value[*to])
-        .sum();
+    let next: f64 = model.moves(s, a).iter().map(|(to, p)| p * value[*to]).sum();
     model.reward(s, a) + model.discount() * next
 }
 
@@ -177,22 +285,28 @@ fn lowest_best(q: &[f64], states: usize, s: usize) -> usize {
 fn evaluate(
     model: &Pomdp,
     policy: &[usize],
+    bonus: f64,
     guess: Vec<f64>,
     budget: &mut Budget<'_>,
 ) -> Result<Vec<f64>, SolveError> {
     let mut rows = Rows::default();
     let mut right = Vec::with_capacity(policy.len());
     for (s, &a) in policy.iter().enumerate() {
-        for (to, p) in model.successors(s, a) {
+        for (to, p) in model.moves(s, a) {
             rows.push(*to, *p);
         }
         rows.end_row();
-        right.push(model.reward(s, a));
+        let bonus = if model.is_goal(s) { 0.0 } else { bonus };
+        right.push(model.reward(s, a) + bonus);
     }
     let system = System {
         rows: &rows,
         right: &right,
         discount: model.discount(),
     };
-    system.solve(guess, budget)
+    if model.discount() < 1.0 {
+        system.solve(guess, budget)
+    } else {
+        system.solve_roughly(guess, budget)
+    }
 }

@@ -16,6 +16,8 @@ pub struct Tib {
     table: Vec<f64>,
     /// R(s,a) at [a][s].
     rewards: Vec<f64>,
+    /// Which observations are possible after (s,a), a bit each: words at [a][s].
+    possible: Vec<u64>,
 }
 
 impl Tib {
@@ -42,10 +44,20 @@ impl Tib {
         let worth = |row: &[f64]| dot(row, belief);
         let block = self.observations * self.actions * n;
         let table = &self.table[action * block..][..block];
-        let next: f64 = table
-            .chunks(self.actions * n)
-            .map(|of_o| of_o.chunks(n).map(worth).fold(f64::NEG_INFINITY, f64::max))
-            .sum();
+        let words = self.observations.div_ceil(64);
+        let mut next = 0.0;
+        // Where part of the state is observed, few observations are possible at once.
+        for word in 0..words {
+            let of_state =
+                |(s, _): &(u32, f64)| self.possible[(action * n + *s as usize) * words + word];
+            let mut possible = belief.iter().map(of_state).fold(0, |all, one| all | one);
+            while possible != 0 {
+                let o = 64 * word + possible.trailing_zeros() as usize;
+                possible &= possible - 1;
+                let of_o = table[o * self.actions * n..][..self.actions * n].chunks(n);
+                next += of_o.map(worth).fold(f64::NEG_INFINITY, f64::max);
+            }
+        }
         worth(&self.rewards[action * n..][..n]) + next
     }
 
@@ -76,7 +88,7 @@ impl Steps {
         let mut belief = Vec::new();
         for s in 0..model.states().len() {
             for a in 0..actions {
-                let successors = model.successors(s, a);
+                let successors = model.moves(s, a);
                 for o in 0..observations {
                     budget.spend(4 * successors.len())?;
                     let likelihood = model.likelihood(a, o);
@@ -142,7 +154,8 @@ impl Steps {
                     }
                 }
                 let rewards = belief.iter().map(|(s, b)| b * model.reward(*s as usize, a));
-                mixtures.end_pair(count, rewards.sum());
+                let may_end = belief.iter().any(|(s, _)| model.may_end(*s as usize, a));
+                mixtures.end_pair(count, rewards.sum(), may_end);
             }
         }
         Ok(mixtures)
@@ -188,13 +201,28 @@ pub fn solve_from(
             for next in 0..actions {
                 table.extend((0..n).map(|s| {
                     let (to, p) = steps.successors(s, a)[o];
-                    model.discount() * p * q[to as usize * actions + next]
+                    // Without any step that goes on there is no belief at all.
+                    let worth = q.get(to as usize * actions + next).unwrap_or(&0.0);
+                    model.discount() * p * worth
                 }));
             }
         }
     }
+    let words = steps.observations.div_ceil(64);
+    let mut possible = vec![0; actions * n * words];
+    for (a, s) in (0..actions).flat_map(|a| (0..n).map(move |s| (a, s))) {
+        for (o, _) in steps
+            .successors(s, a)
+            .iter()
+            .enumerate()
+            .filter(|(_, to)| to.1 > 0.0)
+        {
+            possible[(a * n + s) * words + o / 64] |= 1 << (o % 64);
+        }
+    }
     let pairs = (0..actions).flat_map(|a| (0..n).map(move |s| (a, s)));
     Ok(Tib {
+        possible,
         states: n,
         actions,
         observations: steps.observations,

@@ -1,5 +1,7 @@
 //! From what a reader has collected to a model: rows are checked, expected rewards computed.
 
+use super::distribution::{RowSum, SUM_TOLERANCE, check_probability};
+use super::goals::Goals;
 use super::hash::hash;
 use super::joint::Joint;
 use super::rewards::Rewards;
@@ -7,11 +9,6 @@ use super::sparse::Sparse;
 use super::{Pomdp, Warning};
 use crate::parse_error::{ParseError, Position};
 
-/// Row sums may differ from 1 by this much; beyond it the model is refused. Public files are
-/// written with six digits.
-pub(crate) const ROW_SUM_TOLERANCE: f64 = 1e-5;
-/// Row sums that differ from 1 by more than this are worth a warning.
-pub(crate) const ROW_SUM_WARNING: f64 = 1e-9;
 /// Most warnings of one model; the rest is counted: nobody reads more.
 const WARNINGS_MAX: usize = 100;
 
@@ -75,10 +72,8 @@ impl Pomdp {
         );
         let at = Position { line: 1, column: 1 };
         let successors = transitions.iter().flatten().flatten().map(|(_, p)| p);
-        let mut all = start.iter().chain(&likelihoods).chain(successors);
-        if let Some(wrong) = all.find(|p| !(0.0..=1.0 + ROW_SUM_TOLERANCE).contains(*p)) {
-            let message = format!("{wrong} is no probability, allowed is 0 to 1");
-            return Err(ParseError::new(at, message));
+        for p in start.iter().chain(&likelihoods).chain(successors) {
+            check_probability(*p).map_err(|message| ParseError::new(at, message))?;
         }
         let sparse = transitions.into_iter().map(|rows| {
             let mut sparse = Sparse::default();
@@ -101,32 +96,19 @@ impl Pomdp {
         })
     }
 
-    /// Checks every distribution, and computes what follows from the parts.
+    /// Mends or refuses every row that is no distribution, and computes what follows from the
+    /// parts.
     pub(crate) fn from_parts(mut parts: Parts) -> Result<Self, ParseError> {
         let n = parts.states.len();
-        let mut told = WarningList {
-            warnings: std::mem::take(&mut parts.warnings),
-            left_out: 0,
-        };
-        let start: f64 = parts.start.iter().sum();
-        told.check_sum(start, parts.start_at, || "the start belief".to_owned())?;
-        let [transition_at, observation_at] = &parts.row_at;
-        for (row, at) in transition_at.iter().enumerate() {
-            let (action, state) = (row / n, row % n);
-            let sum = parts.transitions[action].row(state).iter().map(|e| e.1);
-            let name = || parts.row_name("T", action, state);
-            told.check_sum(sum.sum(), *at, name)?;
-        }
+        let warnings = parts.mend()?;
         let sums = observation_sums(&parts.observation, n, parts.observations.len());
-        for (row, (at, sum)) in observation_at.iter().zip(&sums).enumerate() {
-            told.check_sum(*sum, *at, || parts.row_name("O", row / n, row % n))?;
-        }
         let reward = expected_rewards(&parts, &sums);
         let not_finite = reward.iter().position(|r| !r.is_finite());
         if let Some(row) = not_finite {
             let message = format!("{} overflows", parts.row_name("R", row / n, row % n));
             return Err(ParseError::new(parts.start_at, message));
         }
+        let goals = (parts.discount >= 1.0).then(|| Goals::new(&parts.transitions, &reward, n));
         let joint = Joint::new(&parts.transitions, &parts.observation, n);
         let mut model = Self {
             discount: parts.discount,
@@ -139,9 +121,10 @@ impl Pomdp {
             observation: parts.observation,
             rewards: parts.rewards,
             reward,
+            goals,
             joint,
             hash: 0,
-            warnings: told.warnings(),
+            warnings,
         };
         model.hash = hash(&model);
         model.assert_distributions();
@@ -153,7 +136,7 @@ impl Pomdp {
     /// What tracker, bounds and policies rely on. The readers refuse what would break it.
     fn assert_distributions(&self) {
         let n = self.states.len();
-        let is_one = |sum: f64| (sum - 1.0).abs() <= ROW_SUM_TOLERANCE;
+        let is_one = |sum: f64| (sum - 1.0).abs() <= SUM_TOLERANCE;
         for action in 0..self.actions.len() {
             for state in 0..n {
                 let row = self.successors(state, action);
@@ -179,23 +162,38 @@ impl Pomdp {
 }
 
 impl Parts {
+    /// Divides rows that are slightly off by their sums; returns what is to be told.
+    fn mend(&mut self) -> Result<Vec<Warning>, ParseError> {
+        let (n, k) = (self.states.len(), self.observations.len());
+        let mut told = WarningList {
+            warnings: std::mem::take(&mut self.warnings),
+            left_out: 0,
+        };
+        let sum = self.start.iter().sum();
+        let factor = told.judge(sum, self.start_at, || "the start belief".to_owned())?;
+        self.start.iter_mut().for_each(|p| *p *= factor);
+        for row in 0..self.row_at[0].len() {
+            let (action, state) = (row / n, row % n);
+            let sum = self.transitions[action].row(state).iter().map(|e| e.1);
+            let name = || self.row_name("T", action, state);
+            let factor = told.judge(sum.sum(), self.row_at[0][row], name)?;
+            self.transitions[action].scale(state, factor);
+        }
+        let sums = observation_sums(&self.observation, n, k);
+        for (row, at) in self.row_at[1].iter().enumerate() {
+            let (action, state) = (row / n, row % n);
+            let name = || self.row_name("O", action, state);
+            let factor = told.judge(sums[row], *at, name)?;
+            for z in 0..k {
+                self.observation[(action * k + z) * n + state] *= factor;
+            }
+        }
+        Ok(told.warnings())
+    }
+
     fn row_name(&self, table: &str, action: usize, state: usize) -> String {
         format!("{table}: {} : {}", self.actions[action], self.states[state])
     }
-}
-
-/// Refuses what cannot be a distribution; `name` says which.
-pub(crate) fn refuse_sum(
-    sum: f64,
-    at: Position,
-    name: impl Fn() -> String,
-) -> Result<(), ParseError> {
-    if (sum - 1.0).abs() <= ROW_SUM_TOLERANCE {
-        return Ok(());
-    }
-    let allowed = format!("allowed is 1 within {ROW_SUM_TOLERANCE}");
-    let message = format!("{} sums to {sum}, not to 1; {allowed}", name());
-    Err(ParseError::new(at, message))
 }
 
 /// Warnings so far.
@@ -205,30 +203,30 @@ struct WarningList {
 }
 
 impl WarningList {
-    fn check_sum(
+    /// The factor that makes a row's sum 1; `name` says which row.
+    fn judge(
         &mut self,
         sum: f64,
         at: Position,
         name: impl Fn() -> String,
-    ) -> Result<(), ParseError> {
-        let error = (sum - 1.0).abs();
-        if error <= ROW_SUM_WARNING {
-            return Ok(());
+    ) -> Result<f64, ParseError> {
+        let wrong = |problem: String| ParseError::new(at, format!("{} {problem}", name()));
+        let judged = RowSum::new(sum).map_err(wrong)?;
+        if let Some(warning) = judged.warning() {
+            if self.warnings.len() < WARNINGS_MAX {
+                let message = format!("{} {warning}", name());
+                self.warnings.push(Warning { at, message });
+            } else {
+                self.left_out += 1;
+            }
         }
-        refuse_sum(sum, at, &name)?;
-        if self.warnings.len() < WARNINGS_MAX {
-            let message = format!("{} sums to {sum}, not to 1", name());
-            self.warnings.push(Warning { at, message });
-        } else {
-            self.left_out += 1;
-        }
-        Ok(())
+        Ok(judged.factor())
     }
 
     fn warnings(mut self) -> Vec<Warning> {
         if let (Some(last), 1..) = (self.warnings.last(), self.left_out) {
             let at = last.at;
-            let message = format!("and {} more rows do not sum to 1", self.left_out);
+            let message = format!("and {} more rows that do not sum to 1", self.left_out);
             self.warnings.push(Warning { at, message });
         }
         self.warnings
@@ -312,6 +310,28 @@ mod tests {
     #[should_panic(expected = "the start belief is a distribution")]
     fn a_start_belief_that_does_not_sum_to_one_is_caught() {
         broken(|model| model.start[0] = 0.6);
+    }
+
+    #[test]
+    fn rows_that_were_rounded_are_mended_and_stay_so() {
+        let third = "T: toss\n0.333333 0.666666\n0.5 0.5\n";
+        let text = COIN.replace("T: toss uniform\n", third);
+        let text = text.replace("dark\n", "dark\nstart: 0.25 0.750004\n");
+        let text = text.replace("0.25 0.75\n", "0.25 0.750008\n");
+        let model = Pomdp::parse(&text).unwrap();
+        let row = model.successors(0, 0);
+        assert!((row[0].1 - 1.0 / 3.0).abs() < 1e-15 && (row[1].1 - 2.0 / 3.0).abs() < 1e-15);
+        assert!((model.start()[0] - 0.25 / 1.000_004).abs() < 1e-15);
+        assert!((model.likelihood(0, 1)[1] - 0.750_008 / 1.000_008).abs() < 1e-15);
+        let told: Vec<&str> = model.warnings().iter().map(|w| &*w.message).collect();
+        assert!(told[0].starts_with("the start belief sums to 1.000004"));
+        assert!(told[1].starts_with("T: toss : heads sums to 0.999999"));
+        assert!(told[2].starts_with("O: toss : tails sums to 1.000008"));
+        assert!(told.len() == 3 && told[2].ends_with("not to 1; it was divided by that"));
+        let wrong = text.replace("0.666666", "0.666646");
+        let wrong = Pomdp::parse(&wrong).unwrap_err().message;
+        let wanted = "not to 1; allowed is 1 within 0.00001";
+        assert!(wrong.starts_with("T: toss : heads sums to 0.999979") && wrong.ends_with(wanted));
     }
 
     #[test]

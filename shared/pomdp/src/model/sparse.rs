@@ -32,6 +32,12 @@ impl Sparse {
         self.entries.len()
     }
 
+    /// Multiplies a row.
+    pub(crate) fn scale(&mut self, row: usize, factor: f64) {
+        let entries = &mut self.entries[self.starts[row]..self.starts[row + 1]];
+        entries.iter_mut().for_each(|(_, value)| *value *= factor);
+    }
+
     /// Adds a row; columns must ascend. What is 0 is left out.
     pub(crate) fn push(&mut self, row: impl IntoIterator<Item = (usize, f64)>) {
         let some = row.into_iter().filter(|(_, value)| *value != 0.0);

@@ -1,7 +1,6 @@
 //! A policy, and what explains its decisions.
 
-use super::dual::vote_entropy;
-use super::{Choice, Control, Measure, Policy, normalised_entropy};
+use super::{Choice, Control, Measure, Policy, Votes, normalised_entropy};
 use crate::bounds::mdp::Solution;
 use crate::model::Pomdp;
 
@@ -38,9 +37,8 @@ impl Decision {
 /// Decides by a policy. Preallocated.
 pub struct Decider {
     policy: Box<dyn Policy>,
-    best: Vec<usize>,
     values: Vec<f64>,
-    votes: Vec<f64>,
+    votes: Votes,
     action_entropy: f64,
     measure: Measure,
 }
@@ -49,14 +47,10 @@ impl Decider {
     /// Around `policy`, for a model and its fully observable relaxation.
     #[must_use]
     pub fn new(policy: Box<dyn Policy>, model: &Pomdp, solution: &Solution) -> Self {
-        let actions = model.actions().len();
         Self {
             policy,
-            best: (0..model.states().len())
-                .map(|s| solution.best(s))
-                .collect(),
-            values: vec![0.0; actions],
-            votes: vec![0.0; actions],
+            values: vec![0.0; model.actions().len()],
+            votes: Votes::new(solution),
             action_entropy: 0.0,
             measure: Measure::Value,
         }
@@ -70,7 +64,8 @@ impl Decider {
             "the action that a policy chooses is one of the model's, its margin not negative: \
              {choice:?}"
         );
-        self.action_entropy = vote_entropy(belief, &self.best, &mut self.votes);
+        self.votes.count(belief);
+        self.action_entropy = self.votes.entropy();
         self.measure = match choice.control {
             Control::Dual => Measure::Entropy,
             Control::Policy | Control::Stalled => self.policy.measure(),
@@ -113,7 +108,7 @@ impl Decider {
     /// decision: 0 to 1.
     #[must_use]
     pub fn votes(&self) -> &[f64] {
-        &self.votes
+        self.votes.counted()
     }
 
     /// A new mission begins.

@@ -9,8 +9,8 @@
 //! by force (a restart, giving up) teaches most by the formula, at any price: hence information
 //! comes from a declared set of actions. And where no action of the set lowers the entropy, X acts.
 
-use super::entropy::{normalised, normalised_entropy};
-use super::{Choice, Control, LookAhead, Measure, Policy, choose_among};
+use super::entropy::normalised_entropy;
+use super::{Choice, Control, LookAhead, Measure, Policy, Votes, choose_among};
 use crate::bounds::mdp::Solution;
 use crate::model::Pomdp;
 
@@ -101,8 +101,7 @@ pub struct DualControl {
     settings: Dual,
     look_ahead: LookAhead,
     is_allowed: Vec<bool>,
-    best: Vec<usize>,
-    votes: Vec<f64>,
+    votes: Votes,
     run: Run,
 }
 
@@ -143,10 +142,7 @@ impl DualControl {
             settings,
             look_ahead: LookAhead::new(model, solution),
             is_allowed,
-            best: (0..model.states().len())
-                .map(|s| solution.best(s))
-                .collect(),
-            votes: vec![0.0; actions],
+            votes: Votes::new(solution),
             run: Run::default(),
         })
     }
@@ -155,7 +151,10 @@ impl DualControl {
     fn gate_entropy(&mut self, belief: &[f64]) -> f64 {
         match self.settings.gate {
             Gate::State => normalised_entropy(belief),
-            Gate::Action => vote_entropy(belief, &self.best, &mut self.votes),
+            Gate::Action => {
+                self.votes.count(belief);
+                self.votes.entropy()
+            }
         }
     }
 
@@ -200,7 +199,7 @@ impl Policy for DualControl {
         let is_allowed = |action| self.is_allowed.get(action).copied().unwrap_or(false);
         Choice {
             control: Control::Dual,
-            ..choose_among(values, is_allowed)
+            ..choose_among(values, self.votes.count(belief), is_allowed)
         }
     }
 
@@ -212,16 +211,4 @@ impl Policy for DualControl {
         self.run = Run::default();
         self.policy.reset();
     }
-}
-
-/// Writes the votes w(a) = sum_s b(s) [pi_CO(s) = a], and returns their entropy, 0 to 1.
-pub(super) fn vote_entropy(belief: &[f64], best: &[usize], votes: &mut [f64]) -> f64 {
-    votes.fill(0.0);
-    for (b, best) in belief.iter().zip(best) {
-        if let Some(vote) = votes.get_mut(*best) {
-            *vote += b;
-        }
-    }
-    let nats: f64 = votes.iter().map(|w| super::entropy::minus_p_ln_p(*w)).sum();
-    normalised(nats, votes.len())
 }

@@ -1,6 +1,6 @@
 //! The policy of the fast informed bound (Hauskrecht 2000).
 
-use super::{Choice, Policy, choose};
+use super::{Choice, Policy, Votes, choose};
 use crate::bounds::ActionValues;
 
 /// argmax_a b . q_a, where q_a(s) is the fast informed bound of taking `a` in `s`. Unlike
@@ -9,13 +9,20 @@ use crate::bounds::ActionValues;
 #[derive(Debug, Clone, PartialEq)]
 pub struct FastInformed {
     q: ActionValues,
+    votes: Votes,
 }
 
 impl FastInformed {
     /// The policy that follows from the bound's values ([`crate::bounds::fib`]).
     #[must_use]
-    pub const fn new(q: ActionValues) -> Self {
-        Self { q }
+    pub fn new(q: ActionValues) -> Self {
+        let best = |s: usize| {
+            let values: Vec<f64> = q.rows().map(|row| row[s]).collect();
+            choose(&values, &[]).action
+        };
+        let best = (0..q.states()).map(best).collect();
+        let votes = Votes::by_states(best, q.rows().len());
+        Self { q, votes }
     }
 }
 
@@ -24,6 +31,6 @@ impl Policy for FastInformed {
         for (value, q) in values.iter_mut().zip(self.q.rows()) {
             *value = belief.iter().zip(q).map(|(b, q)| b * q).sum();
         }
-        choose(values)
+        choose(values, self.votes.count(belief))
     }
 }

@@ -30,7 +30,7 @@ struct Outlook {
     entries: Vec<(usize, f64)>,
     /// Z(a,s',z), one row of s' for each observation that can come.
     columns: Vec<f64>,
-    /// sum_z Z(a,s',z): 1, but for the rounding that the model's file allows.
+    /// sum_z Z(a,s',z): 1, but for rounding.
     mass: Vec<f64>,
     /// -sum_z Z ln Z, nats.
     noise: Vec<f64>,

@@ -13,9 +13,10 @@
 //! pi_CO and Q_CO are those of the fully observable relaxation, [`crate::mdp`].
 //!
 //! **Ties** decide results (a tiger's start belief is one), hence one rule for all: whatever is
-//! within 1e-9 of the best, relative to the best or to 1, is as good as the best, and the lowest
-//! index wins. It holds for pi_CO (relative to the largest value of any state), for the most
-//! likely state, for votes and values, and for the least expected entropy. The margin to the
+//! within 1e-9 of the best, relative to the best or to 1, is as good as the best. Of these actions
+//! the one with the most votes ([`Votes`]) wins, and of equal votes, by the same tolerance, the
+//! lowest index. A state votes by pi_CO; under `fib` and `point-based` by the policy's own values
+//! where the state is certain. A state's own ties go to the lowest index. The margin to the
 //! runner-up is part of every choice, so that a tie is visible.
 //!
 //! A [`Decider`] adds to a policy what a record needs to explain a decision: the votes and both
@@ -32,6 +33,7 @@ mod most_likely_state;
 mod name;
 mod point_based;
 mod qmdp;
+mod votes;
 mod voting;
 
 pub use decider::{Decider, Decision};
@@ -44,6 +46,7 @@ pub use most_likely_state::MostLikelyState;
 pub use name::{Base, BuildError, KindError, NameError, PolicyKind, PolicyName};
 pub use point_based::PointBased;
 pub use qmdp::QMdp;
+pub use votes::Votes;
 pub use voting::ActionVoting;
 
 /// What an action was chosen for.
@@ -106,16 +109,17 @@ pub trait Policy: Send {
 const TIE: f64 = 1e-9;
 
 /// The largest value; ties (within 1e-9 of the largest value or of 1, whichever is larger) go to
-/// the lowest index, so that rounding never decides. Values that are NaN are passed over.
+/// the most `votes` (none that is missing), then to the lowest index, so that rounding never
+/// decides. Values that are NaN are passed over.
 #[must_use]
-pub fn choose(values: &[f64]) -> Choice {
-    choose_among(values, |_| true)
+pub fn choose(values: &[f64], votes: &[f64]) -> Choice {
+    choose_among(values, votes, |_| true)
 }
 
 /// As [`choose`], among the actions that are `allowed`; the margin is to the best of the others
 /// that are. Action 0 if none is.
 #[must_use]
-pub fn choose_among(values: &[f64], allowed: impl Fn(usize) -> bool) -> Choice {
+pub fn choose_among(values: &[f64], votes: &[f64], allowed: impl Fn(usize) -> bool) -> Choice {
     let candidates = || {
         values
             .iter()
@@ -130,7 +134,10 @@ pub fn choose_among(values: &[f64], allowed: impl Fn(usize) -> bool) -> Choice {
     };
     let best = largest(None);
     let least = least_of_best(best);
-    let action = candidates().find(|&(_, value)| value >= least);
+    let tied = || candidates().filter(|&(_, value)| value >= least);
+    let votes = |action: usize| votes.get(action).copied().unwrap_or(0.0);
+    let most = tied().fold(f64::NEG_INFINITY, |max, (action, _)| max.max(votes(action)));
+    let action = tied().find(|&(action, _)| votes(action) >= least_of_best(most));
     let action = action.map_or(0, |(action, _)| action);
     assert_best(values, action, best);
     // Below 0 only by what still counts as a tie.
@@ -167,10 +174,21 @@ mod tests {
 
     #[test]
     fn infinite_values_are_chosen_among_too() {
-        let chosen = |values: &[f64]| (choose(values).action, choose(values).margin);
+        let chosen = |values: &[f64]| (choose(values, &[]).action, choose(values, &[]).margin);
         assert_eq!(chosen(&[1.0, f64::INFINITY]), (1, 0.0));
         assert_eq!(chosen(&[f64::NAN, f64::NEG_INFINITY]), (1, 0.0));
         assert_eq!(chosen(&[f64::NAN, f64::NAN]), (0, 0.0));
+    }
+
+    #[test]
+    fn votes_decide_among_equal_values_alone() {
+        let votes = [0.1, 0.2, 0.2 + 1e-10, 0.9];
+        assert_eq!(choose(&[5.0, 5.0, 5.0, 4.9], &votes).action, 1);
+        assert_eq!(choose(&[5.0, 4.9, 5.0 - 1e-9, 4.9], &votes).action, 2);
+        assert_eq!(choose(&[5.0, 4.9, 5.0 - 1e-8, 4.9], &votes).action, 0);
+        assert_eq!(choose_among(&[5.0; 4], &votes, |a| a < 3).action, 1);
+        assert_eq!(choose(&[5.0; 4], &[]).action, 0);
+        assert_eq!(choose(&[5.0; 2], &[f64::NAN; 2]).action, 0);
     }
 
     #[test]

@@ -40,8 +40,8 @@ impl Base {
     /// [`SolveError`] if the values of `fib` cannot be found; the others have theirs.
     pub fn build(self, model: &Pomdp, solution: &Solution) -> Result<Box<dyn Policy>, SolveError> {
         Ok(match self {
-            Self::MostLikelyState => Box::new(MostLikelyState::new(solution.clone())),
-            Self::ActionVoting => Box::new(ActionVoting::new(solution.clone())),
+            Self::MostLikelyState => Box::new(MostLikelyState::new(solution)),
+            Self::ActionVoting => Box::new(ActionVoting::new(solution)),
             Self::QMdp => Box::new(QMdp::new(solution.clone())),
             Self::FastInformed => {
                 let q = fib::solve_from(model, solution, &mut Budget::new(&mut || false))?;

@@ -1,7 +1,7 @@
 //! The policy of a point-based solution: begin the plan that is worth most.
 
 use super::completion::completed;
-use super::{Choice, Policy, choose};
+use super::{Choice, Policy, Votes, choose};
 use crate::alpha_vectors::{AlphaVectors, VectorError};
 use crate::model::Pomdp;
 
@@ -22,6 +22,7 @@ pub struct PointBased {
     columns: Vec<f64>,
     /// alpha·b of each vector.
     worth: Vec<f64>,
+    votes: Votes,
 }
 
 impl PointBased {
@@ -38,9 +39,18 @@ impl PointBased {
         let vectors = completed(model, vectors)?;
         let (actions, rows): (Vec<usize>, Vec<&[f64]>) = vectors.rows().unzip();
         let column = |s: usize| rows.iter().filter_map(move |row| row.get(s).copied());
+        let best = |s: usize| {
+            let mut values = vec![f64::NEG_INFINITY; model.actions().len()];
+            for (action, value) in actions.iter().zip(column(s)) {
+                values[*action] = values[*action].max(value);
+            }
+            choose(&values, &[]).action
+        };
+        let best = (0..vectors.states()).map(best).collect();
         Ok(Self {
             columns: (0..vectors.states()).flat_map(column).collect(),
             worth: vec![0.0; actions.len()],
+            votes: Votes::by_states(best, model.actions().len()),
             actions,
         })
     }
@@ -77,6 +87,6 @@ impl Policy for PointBased {
                 *value = value.max(*worth);
             }
         }
-        choose(values)
+        choose(values, self.votes.count(belief))
     }
 }

@@ -1,6 +1,6 @@
 //! Q-MDP: the action with the largest expected value if all became observable after it.
 
-use super::{Choice, Policy, choose};
+use super::{Choice, Policy, Votes, choose};
 use crate::bounds::mdp::Solution;
 
 /// argmax_a sum_s b(s) Q_CO(s,a). Never gathers information for its own sake; see
@@ -8,13 +8,15 @@ use crate::bounds::mdp::Solution;
 #[derive(Debug, Clone, PartialEq)]
 pub struct QMdp {
     solution: Solution,
+    votes: Votes,
 }
 
 impl QMdp {
     /// The policy that follows from a solved model.
     #[must_use]
-    pub const fn new(solution: Solution) -> Self {
-        Self { solution }
+    pub fn new(solution: Solution) -> Self {
+        let votes = Votes::new(&solution);
+        Self { solution, votes }
     }
 }
 
@@ -27,6 +29,6 @@ impl Policy for QMdp {
                 .map(|(b, q)| b * q)
                 .sum();
         }
-        choose(values)
+        choose(values, self.votes.count(belief))
     }
 }

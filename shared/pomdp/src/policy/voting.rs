@@ -1,31 +1,31 @@
 //! Action voting: every state votes for its best action, with its probability.
 
-use super::{Choice, Measure, Policy, choose};
+use super::{Choice, Measure, Policy, Votes, choose};
 use crate::bounds::mdp::Solution;
 
 /// argmax_a w(a), w(a) = sum_s b(s) [pi_CO(s) = a].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActionVoting {
-    solution: Solution,
+    votes: Votes,
 }
 
 impl ActionVoting {
     /// The policy that follows from a solved model.
     #[must_use]
-    pub const fn new(solution: Solution) -> Self {
-        Self { solution }
+    pub fn new(solution: &Solution) -> Self {
+        Self {
+            votes: Votes::new(solution),
+        }
     }
 }
 
 impl Policy for ActionVoting {
     fn evaluate(&mut self, belief: &[f64], values: &mut [f64]) -> Choice {
-        values.fill(0.0);
-        for (state, b) in belief.iter().enumerate() {
-            if let Some(vote) = values.get_mut(self.solution.best(state)) {
-                *vote += b;
-            }
+        let votes = self.votes.count(belief);
+        for (value, vote) in values.iter_mut().zip(votes) {
+            *value = *vote;
         }
-        choose(values)
+        choose(values, votes)
     }
 
     fn measure(&self) -> Measure {

@@ -2,7 +2,7 @@
 
 use super::scope::Scope;
 use super::xml::{Element, short};
-use crate::model::ROW_SUM_TOLERANCE;
+use crate::model::check_probability;
 use crate::parse_error::ParseError;
 use crate::reader::limits::{ENTRIES_MAX, WRITES_MAX};
 
@@ -167,8 +167,7 @@ impl Table {
             _ => {}
         }
         let allowed = |value: &f64| {
-            let is_in_range = (0.0..=1.0 + ROW_SUM_TOLERANCE).contains(value);
-            value.is_finite() && (is_in_range || !is_probability)
+            value.is_finite() && (!is_probability || check_probability(*value).is_ok())
         };
         let mut numbers = Vec::new();
         for word in text.split_whitespace() {

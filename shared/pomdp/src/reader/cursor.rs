@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::lexer::{Lexer, PlacedToken, Token};
 use super::limits::NAMES_MAX;
+use crate::model::check_probability;
 use crate::parse_error::{ParseError, Position};
 
 /// Words with a meaning of their own; never names.
@@ -177,11 +178,8 @@ impl<'a> Cursor<'a> {
     pub(super) fn probability(&mut self) -> Result<f64, ParseError> {
         let at = self.at();
         let p = self.number()?;
-        if (0.0..=1.0 + crate::model::ROW_SUM_TOLERANCE).contains(&p) {
-            return Ok(p);
-        }
-        let message = format!("{p} is not a probability, allowed is 0 to 1");
-        Err(ParseError::new(at, message))
+        check_probability(p).map_err(|message| ParseError::new(at, message))?;
+        Ok(p)
     }
 
     /// `: 5`, or `: name name ...`.

@@ -2,7 +2,7 @@
 
 use super::limits::{self, ENTRIES_MAX};
 use super::replay::Rules;
-use crate::model::refuse_sum;
+use crate::model::RowSum;
 use crate::model::sparse::Sparse;
 use crate::parse_error::{ParseError, Position};
 
@@ -136,7 +136,8 @@ pub(super) fn transitions(
     let mut kept = 0;
     let at = rows(rules, rules.states, start, |action, state, row, at| {
         let sum = row.entries().map(|(_, p)| p).sum();
-        refuse_sum(sum, at, || name(action, state))?;
+        let wrong = |problem| ParseError::new(at, format!("{} {problem}", name(action, state)));
+        RowSum::new(sum).map_err(wrong)?;
         if all.len() == action {
             all.push(Sparse::default());
         }

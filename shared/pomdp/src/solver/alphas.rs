@@ -3,6 +3,7 @@
 //! A vector knows its action and, for each observation, the vector whose plan goes on: together
 //! they are a controller, whose value the vectors never exceed.
 
+use super::blocks::Blocks;
 use crate::bounds::ActionValues;
 use crate::sparse_beliefs::{BeliefId, dot};
 
@@ -19,14 +20,21 @@ pub(super) struct Alphas {
     successors: Vec<AlphaId>,
     /// The belief at which each was made; none for the blind policies.
     origins: Vec<Option<BeliefId>>,
-    /// Those that are looked at, by the instant of their last change.
-    active: Vec<(u32, AlphaId)>,
+    blocks: Blocks,
+    /// Those that are looked at, by the block of the beliefs at which they were made, then those of
+    /// several blocks and the blind ones; by the instant of their last change.
+    active: Vec<Vec<(u32, AlphaId)>>,
     stamp: u32,
 }
 
 impl Alphas {
-    /// Begins with the blind policies.
-    pub(super) fn new(blind: &ActionValues, states: usize, observations: usize) -> Self {
+    /// Begins with the blind policies. With discount 1 what they go on with is a lot, of all of them.
+    pub(super) fn new(
+        blind: &ActionValues,
+        states: usize,
+        observations: usize,
+        blocks: Blocks,
+    ) -> Self {
         let mut alphas = Self {
             states,
             observations,
@@ -34,12 +42,13 @@ impl Alphas {
             actions: Vec::new(),
             successors: Vec::new(),
             origins: Vec::new(),
-            active: Vec::new(),
+            active: vec![Vec::new(); blocks.count() + 1],
+            blocks,
             stamp: 0,
         };
         for (action, row) in blind.rows().enumerate() {
             let itself = vec![action as AlphaId; observations];
-            alphas.push(None, action, row, &itself);
+            alphas.push((None, &[]), action, row, &itself);
         }
         alphas
     }
@@ -51,7 +60,7 @@ impl Alphas {
 
     /// How many are looked at.
     pub(super) fn active_count(&self) -> usize {
-        self.active.len()
+        self.active.iter().map(Vec::len).sum()
     }
 
     /// Instant of the last change.
@@ -81,9 +90,10 @@ impl Alphas {
         dot(self.values(id), belief)
     }
 
+    /// Adds a vector that was made at the belief `origin`, with its entries.
     pub(super) fn push(
         &mut self,
-        origin: Option<BeliefId>,
+        (origin, belief): (Option<BeliefId>, &[(u32, f64)]),
         action: usize,
         values: &[f64],
         successors: &[AlphaId],
@@ -98,7 +108,9 @@ impl Alphas {
         self.values.extend_from_slice(values);
         self.successors.extend_from_slice(successors);
         self.stamp += 1;
-        self.active.push((self.stamp, id));
+        let block = self.blocks.around(belief);
+        let block = block.unwrap_or(self.blocks.count());
+        self.active[block].push((self.stamp, id));
         id
     }
 
@@ -110,9 +122,18 @@ impl Alphas {
         belief: &[(u32, f64)],
         mut best: (AlphaId, f64),
     ) -> ((AlphaId, f64), usize) {
-        let newer = self.active.iter().rev();
+        let count = self.blocks.count();
+        let of_several = &self.active[count..];
+        let own = match self.blocks.around(belief) {
+            Some(block) => &self.active[block..=block],
+            None => &self.active[..count],
+        };
+        let newer = own.iter().chain(of_several).flat_map(|vectors| {
+            let newest_first = vectors.iter().rev();
+            newest_first.take_while(|(stamp, _)| *stamp > seen)
+        });
         let mut looked_at = 0;
-        for (_, id) in newer.take_while(|(stamp, _)| *stamp > seen) {
+        for (_, id) in newer {
             looked_at += 1;
             let value = self.value(*id, belief);
             if value > best.1 {
@@ -124,19 +145,25 @@ impl Alphas {
 
     /// Goes on looking only at those that `keep` says.
     pub(super) fn retain(&mut self, keep: impl Fn(AlphaId) -> bool) {
-        self.active.retain(|(_, id)| keep(*id));
+        for vectors in &mut self.active {
+            vectors.retain(|(_, id)| keep(*id));
+        }
     }
 
     /// Those that are looked at.
     pub(super) fn active(&self) -> impl Iterator<Item = AlphaId> {
-        self.active.iter().map(|(_, id)| *id)
+        let (own, of_several) = self.active.split_at(self.blocks.count());
+        let lists = of_several.iter().chain(own);
+        lists.flatten().map(|(_, id)| *id)
     }
 }
 
 #[test]
 #[should_panic(expected = "vectors of the solver are finite")]
 fn a_vector_that_is_not_finite_is_caught() {
-    let mut alphas = Alphas::new(&ActionValues::new(2, vec![0.0, 1.0]), 2, 1);
+    let model = "discount: 0 states: 2 actions: 1 observations: 1 T: * identity O: * uniform";
+    let blocks = Blocks::new(&crate::Pomdp::parse(model).unwrap());
+    let mut alphas = Alphas::new(&ActionValues::new(2, vec![0.0, 1.0]), 2, 1, blocks);
     assert_eq!(alphas.len(), 1);
-    alphas.push(None, 0, &[0.0, f64::INFINITY], &[0]);
+    alphas.push((None, &[]), 0, &[0.0, f64::INFINITY], &[0]);
 }

@@ -116,7 +116,8 @@ impl Tree<'_> {
             successors[child.observation as usize] = self.nodes[child.node as usize].witness;
         }
         let values = self.backed_up(action, &successors);
-        self.alphas.push(Some(id), action, &values, &successors);
+        let origin = (Some(id), self.beliefs.entries(id));
+        self.alphas.push(origin, action, &values, &successors);
         let states = self.model.states().len();
         budget.spend(states * (states + successors.len()) / 2)
     }
@@ -125,16 +126,15 @@ impl Tree<'_> {
     pub(super) fn backed_up(&self, action: usize, successors: &[AlphaId]) -> Vec<f64> {
         let model = self.model;
         let states = model.states().len();
-        let mut seen = vec![0.0; states];
-        for (o, successor) in successors.iter().enumerate() {
-            let alpha = self.alphas.values(*successor);
-            for ((sum, z), v) in seen.iter_mut().zip(model.likelihood(action, o)).zip(alpha) {
-                *sum += z * v;
-            }
-        }
+        let seen = |s: usize| -> f64 {
+            let seen = self.followers.seen(action, s).iter();
+            seen.map(|(o, z)| z * self.alphas.values(successors[*o])[s])
+                .sum()
+        };
+        let seen: Vec<f64> = (0..states).map(seen).collect();
         (0..states)
             .map(|s| {
-                let next = model.successors(s, action).iter();
+                let next = model.moves(s, action).iter();
                 let next: f64 = next.map(|(to, p)| p * seen[*to]).sum();
                 model.reward(s, action) + model.discount() * next
             })

@@ -28,6 +28,9 @@ const BELIEFS_MAX: usize = 5000;
 const PRODUCTS_MAX: usize = 1_000_000_000;
 /// Steps of the runs of a round, at most.
 const STEPS_MAX: usize = 200_000;
+/// Runs of a round, at least: a run that would take too large a share is cut off. Chosen by hand:
+/// fewer say little about their standard error.
+const RUNS_MIN: usize = 20;
 /// A run ends where the discount has fallen below this.
 const DISCOUNT_MIN: f64 = 1e-4;
 /// Times that further vectors are chosen after runs.
@@ -49,8 +52,8 @@ pub struct Compact {
     pub loss_error: f64,
 }
 
-/// A policy of at most `vectors_max` of `vectors`, of a model whose discount is below 1. Equal
-/// inputs give equal policies.
+/// A policy of at most `vectors_max` of `vectors`. With discount 1 it is all of them if so few do not
+/// come to an end. Equal inputs give equal policies.
 ///
 /// # Errors
 /// [`SolveError::Stopped`] if the budget ends.
@@ -80,6 +83,13 @@ pub fn compact(
         }
         // Other runs than those that the vectors were chosen by.
         losses = choice.run(round, budget)?;
+    }
+    if !losses.mean.is_finite() {
+        return Ok(Compact {
+            vectors: vectors.clone(),
+            loss_mean: 0.0,
+            loss_error: 0.0,
+        });
     }
     let vectors = choice
         .vectors()
@@ -120,7 +130,7 @@ impl<'m> Choice<'m> {
             scale: values.fold(0.0, |most, value| most.max(value.abs())),
             plans,
             kept: Vec::new(),
-            followers: Followers::default(),
+            followers: Followers::new(model),
         }
     }
 
@@ -228,28 +238,9 @@ impl<'m> Choice<'m> {
         let (mut steps, began) = (0, budget.spent());
         let (mut sums, mut beliefs) = (Vec::new(), Vec::new());
         while steps < STEPS_MAX && budget.spent() < began + PRODUCTS_MAX as u64 {
-            let mut belief = sparse(self.model.start());
-            let (mut discount, mut sum) = (1.0, 0.0);
-            while discount > DISCOUNT_MIN {
-                let (_, value) = self.best(&belief);
-                let (plan, kept) = self.best_kept(&belief);
-                let loss = (value - kept).max(0.0);
-                sum += discount * loss;
-                if loss > ROUNDING * self.scale && beliefs.len() < self.beliefs_max() {
-                    beliefs.push(belief.clone());
-                }
-                let action = self.plans[plan].0;
-                let next = self.draw(&belief, action, random.random(), budget)?;
-                discount *= self.model.discount();
-                steps += 1;
-                if next == belief && self.stays(&belief, action, budget)? {
-                    // For ever.
-                    sum += discount * loss / (1.0 - self.model.discount());
-                    break;
-                }
-                belief = next;
-            }
+            let (sum, taken) = self.run_once(&mut random, &mut beliefs, budget)?;
             sums.push(sum);
+            steps += taken;
         }
         let count = sums.len() as f64;
         let mean = sums.iter().sum::<f64>() / count;
@@ -259,6 +250,54 @@ impl<'m> Choice<'m> {
             error: (squares / (count - 1.0).max(1.0) / count).sqrt(),
             beliefs,
         })
+    }
+
+    /// One run: what it loses, and its steps. What is left of one that is cut off is thought to lose
+    /// in each step what its second half did; with discount 1, without bound.
+    fn run_once(
+        &mut self,
+        random: &mut Pcg64Mcg,
+        beliefs: &mut Vec<SparseBelief>,
+        budget: &mut Budget<'_>,
+    ) -> Result<(f64, usize), StopRequest> {
+        let rest = 1.0 - self.model.discount();
+        let work_max = budget.spent() + (PRODUCTS_MAX / RUNS_MIN) as u64;
+        let mut belief = sparse(self.model.start());
+        let (mut discount, mut sum) = (1.0, 0.0);
+        let mut losses = Vec::new();
+        while discount > DISCOUNT_MIN {
+            if losses.len() >= STEPS_MAX / RUNS_MIN || budget.spent() >= work_max {
+                let half = &losses[losses.len() / 2..];
+                let mean = half.iter().sum::<f64>() / half.len().max(1) as f64;
+                // Never ending costs something, by what a goal problem is.
+                let left = if rest > 0.0 {
+                    mean / rest
+                } else {
+                    f64::INFINITY
+                };
+                return Ok((sum + discount * left, losses.len()));
+            }
+            let (_, value) = self.best(&belief);
+            let (plan, kept) = self.best_kept(&belief);
+            let loss = (value - kept).max(0.0);
+            sum += discount * loss;
+            losses.push(loss);
+            if loss > ROUNDING * self.scale && beliefs.len() < self.beliefs_max() {
+                beliefs.push(belief.clone());
+            }
+            let action = self.plans[plan].0;
+            let Some(next) = self.draw(&belief, action, random.random(), budget)? else {
+                break;
+            };
+            discount *= self.model.discount();
+            if rest > 0.0 && next == belief && self.stays(&belief, action, budget)? {
+                // For ever.
+                sum += discount * loss / rest;
+                break;
+            }
+            belief = next;
+        }
+        Ok((sum, losses.len()))
     }
 
     /// True if no other belief may follow.
@@ -279,14 +318,17 @@ impl<'m> Choice<'m> {
         Ok(stays)
     }
 
-    /// The belief that follows where a number between 0 and 1 says what is observed.
+    /// The belief that follows where a number between 0 and 1 says what is observed; none if that is
+    /// a goal.
     fn draw(
         &mut self,
         belief: &[(u32, f64)],
         action: usize,
         number: f64,
         budget: &mut Budget<'_>,
-    ) -> Result<SparseBelief, StopRequest> {
+    ) -> Result<Option<SparseBelief>, StopRequest> {
+        let ends = |(s, _): &(u32, f64)| self.model.may_end(*s as usize, action);
+        let may_end = belief.iter().any(ends);
         let (mut left, mut next) = (number, Vec::new());
         let work = self
             .followers
@@ -300,7 +342,7 @@ impl<'m> Choice<'m> {
                 Ok(())
             })?;
         budget.spend(work + self.plans.len() * belief.len())?;
-        Ok(next)
+        Ok((left < 0.0 || !may_end).then_some(next))
     }
 }
 

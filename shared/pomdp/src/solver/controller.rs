@@ -91,7 +91,8 @@ impl Tree<'_> {
                 })
                 .collect();
             let alpha = &values[part * states..][..states];
-            let origin = Some(controller.parts[part]);
+            let id = controller.parts[part];
+            let origin = (Some(id), self.beliefs.entries(id));
             self.alphas
                 .push(origin, controller.actions[part], alpha, &successors);
         }
@@ -131,7 +132,7 @@ impl Tree<'_> {
         for at in visited {
             let Some(action) = at.action else { continue };
             for s in 0..states {
-                entries += self.model.successors(s, action).len() * observations;
+                entries += self.model.moves(s, action).len() * observations;
             }
             if entries > ENTRIES_MAX {
                 break;
@@ -222,7 +223,7 @@ impl Tree<'_> {
                 let mut mass = 0.0;
                 for (o, next) in next.iter().enumerate() {
                     let likelihood = model.likelihood(*action, o);
-                    for (to, p) in model.successors(s, *action) {
+                    for (to, p) in model.moves(s, *action) {
                         let w = p * likelihood[*to];
                         mass += w;
                         match next {
@@ -237,7 +238,7 @@ impl Tree<'_> {
                 rows.end_row();
                 right.push(reward);
                 mass_max = mass_max.max(mass);
-                budget.spend(observations * model.successors(s, *action).len())?;
+                budget.spend(observations * model.moves(s, *action).len())?;
             }
             let witness = self.nodes[controller.parts[part] as usize].witness;
             guess.extend(self.alphas.values(witness));
@@ -247,6 +248,9 @@ impl Tree<'_> {
             right: &right,
             discount: model.discount(),
         };
+        if model.discount() >= 1.0 {
+            return system.solve_beside(-1.0, guess, budget);
+        }
         let mut values = system.solve_roughly(guess, budget)?;
         let short = system
             .residual(&values)

@@ -44,6 +44,10 @@ impl Tree<'_> {
             }
             if !std::mem::replace(&mut is_closed[stands as usize], true) {
                 open.extend(self.alphas.successors(stands));
+                if self.alphas.origin(stands).is_none() && self.model.discount() >= 1.0 {
+                    // Goes on by lot, that is, with any of them.
+                    open.extend(0..actions as AlphaId);
+                }
             }
         }
         needed.sort_unstable();

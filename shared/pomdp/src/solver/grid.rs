@@ -8,8 +8,8 @@
 use std::collections::HashMap;
 
 use super::tree::Tree;
-use crate::bounds::linear::{Rows, System};
-use crate::bounds::{SolveError, contraction};
+use crate::bounds::linear::{Rows, System, largest};
+use crate::bounds::{SolveError, contraction, rounding, slacks};
 use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
@@ -62,6 +62,58 @@ impl Choices {
             }
         }
         best
+    }
+
+    /// Policy iteration with a `bonus` for each choice, from those that are `held`.
+    fn improve(
+        &self,
+        held: &mut [usize],
+        discount: f64,
+        bonus: f64,
+        mut values: Vec<f64>,
+        budget: &mut Budget<'_>,
+    ) -> Result<Vec<f64>, SolveError> {
+        for round in 0..ROUNDS_MAX {
+            // A new bonus changes the values of the same choices.
+            let mut is_changed = bonus > 0.0 && round == 0;
+            for (belief, held) in held.iter_mut().enumerate() {
+                let (choice, value) = self.best(belief, discount, &values);
+                let is_better = *held == usize::MAX || {
+                    let before = self.value(*held, discount, &values);
+                    value > before + 1e-13 * before.abs()
+                };
+                if is_better && choice != *held {
+                    *held = choice;
+                    is_changed = true;
+                }
+            }
+            budget.spend(self.constants.len())?;
+            if !is_changed {
+                break;
+            }
+            let (mut rows, mut right) = (Rows::default(), Vec::new());
+            for choice in held.iter() {
+                for (to, p) in self.links.row(*choice) {
+                    rows.push(*to as usize, *p);
+                }
+                rows.end_row();
+                right.push(self.constants[*choice] + bonus);
+            }
+            let system = System {
+                rows: &rows,
+                right: &right,
+                discount,
+            };
+            values = system.solve_roughly(values, budget)?;
+        }
+        Ok(values)
+    }
+
+    /// What the best choice of a belief exceeds its value by, at most.
+    fn excess(&self, discount: f64, values: &[f64]) -> f64 {
+        let beliefs = values.iter().enumerate();
+        let excess = beliefs.map(|(belief, v)| self.best(belief, discount, values).1 - v);
+        excess.fold(f64::NEG_INFINITY, f64::max)
     }
 }
 
@@ -262,46 +314,24 @@ impl Tree<'_> {
     ) -> Result<Vec<f64>, SolveError> {
         let discount = self.model.discount();
         let mut held = vec![usize::MAX; values.len()];
-        for _ in 0..ROUNDS_MAX {
-            let mut is_changed = false;
-            for (belief, held) in held.iter_mut().enumerate() {
-                let (choice, value) = choices.best(belief, discount, &values);
-                let is_better = *held == usize::MAX || {
-                    let before = choices.value(*held, discount, &values);
-                    value > before + 1e-13 * before.abs()
-                };
-                if is_better && choice != *held {
-                    *held = choice;
-                    is_changed = true;
-                }
+        if discount < 1.0 {
+            values = choices.improve(&mut held, discount, 0.0, values, budget)?;
+            let excess = choices.excess(discount, &values).max(0.0);
+            let error = excess / (1.0 - contraction(discount, choices.mass_max)?);
+            if !error.is_finite() {
+                return Err(SolveError::Unbounded(discount));
             }
-            budget.spend(choices.constants.len())?;
-            if !is_changed {
-                break;
-            }
-            let (mut rows, mut right) = (Rows::default(), Vec::new());
-            for choice in &held {
-                for (to, p) in choices.links.row(*choice) {
-                    rows.push(*to as usize, *p);
-                }
-                rows.end_row();
-                right.push(choices.constants[*choice]);
-            }
-            let system = System {
-                rows: &rows,
-                right: &right,
-                discount,
-            };
-            values = system.solve_roughly(values, budget)?;
+            values.iter_mut().for_each(|v| *v += error);
+            return Ok(values);
         }
-        let excess = (0..values.len())
-            .map(|belief| choices.best(belief, discount, &values).1 - values[belief])
-            .fold(0.0, f64::max);
-        let error = excess / (1.0 - contraction(discount, choices.mass_max)?);
-        if !error.is_finite() {
-            return Err(SolveError::Unbounded(discount));
+        let error = rounding(choices.links.longest());
+        let scale = largest(&values);
+        for slack in slacks(discount, error) {
+            values = choices.improve(&mut held, discount, slack * scale, values, budget)?;
+            if choices.excess(discount, &values) + error * largest(&values) <= 0.0 {
+                return Ok(values);
+            }
         }
-        values.iter_mut().for_each(|v| *v += error);
-        Ok(values)
+        Err(SolveError::Unbounded(discount))
     }
 }

@@ -3,9 +3,9 @@
 use super::report::{Bracket, SearchResult};
 use crate::alpha_vectors::AlphaVectors;
 use crate::bounds::tib::{self, Tib};
-use crate::bounds::{ActionValues, SolveError, blind, fib};
+use crate::bounds::{ActionValues, SolveError, blind, fib, mdp};
 use crate::budget::Budget;
-use crate::model::{Pomdp, ROW_SUM_TOLERANCE, ROW_SUM_WARNING};
+use crate::model::{Pomdp, SUM_TOLERANCE};
 use crate::sparse_beliefs::MERGED;
 
 /// What the budget allowed.
@@ -63,12 +63,23 @@ impl Initial {
         (0..states).map(corner).collect()
     }
 
-    /// What rounding, and the merging of beliefs that differ by no more, may amount to.
-    pub(super) fn rounding(&self, model: &Pomdp) -> f64 {
+    /// What rounding, and the merging of beliefs that differ by no more, may amount to; `lower` is
+    /// a lower bound at the start belief.
+    pub(super) fn rounding(
+        &self,
+        model: &Pomdp,
+        lower: f64,
+        budget: &mut Budget<'_>,
+    ) -> Result<f64, SolveError> {
         let bounds = self.blind.iter().chain(&self.fast);
         let values = bounds.flat_map(ActionValues::rows).flatten();
         let largest = values.fold(0.0_f64, |m, v| m.max(v.abs()));
-        MERGED * largest / (1.0 - model.discount())
+        let steps = if model.discount() < 1.0 {
+            1.0 / (1.0 - model.discount())
+        } else {
+            mdp::steps_max(model, lower, budget)?
+        };
+        Ok(MERGED * largest * steps)
     }
 }
 
@@ -96,16 +107,11 @@ pub(super) fn trivial(model: &Pomdp) -> Bracket {
         least = least.min(reward);
         most = most.max(reward);
     }
-    let off = if model.warnings().is_empty() {
-        ROW_SUM_WARNING
-    } else {
-        ROW_SUM_TOLERANCE
-    };
     // Mass that is gained or lost in a step, whichever makes the bracket wider: a row of T and one
     // of Z may each be off, and their product by a little more than the sum.
     let for_ever = |reward: f64, outward: f64| {
         let sign = outward * reward.signum();
-        let discount = model.discount() * (1.0 + sign * 2.1 * off);
+        let discount = model.discount() * (1.0 + sign * 2.1 * SUM_TOLERANCE);
         if discount < 1.0 {
             reward / (1.0 - discount)
         } else {

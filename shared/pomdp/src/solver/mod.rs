@@ -15,12 +15,15 @@
 //!   of the work, and all of it where walks go round in circles: a walk follows the most probable
 //!   observation again and again, even where what is worth knowing is rare. What matters there
 //!   follows from how often a plan visits each belief (`occupancy`);
+//! - where part of the state is observed, a belief looks at the points and vectors of its own part
+//!   alone; that is found out from the observations (`blocks`);
 //! - a small policy is chosen from the vectors (`compact`).
 //!
 //! The same model and precision give the same vectors, unless time or memory ended the search.
 
 mod alphas;
 mod backup;
+mod blocks;
 mod compact;
 mod controller;
 mod corners;

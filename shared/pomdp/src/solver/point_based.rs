@@ -1,6 +1,7 @@
 //! The search from beginning to end.
 
 use super::alphas::Alphas;
+use super::blocks::Blocks;
 use super::initial::{self, Initial};
 use super::report::{Bracket, EndReason, Options, Progress, SearchResult};
 use super::sawtooth::Sawtooth;
@@ -18,11 +19,11 @@ const REWARD_MAX: f64 = 1e290;
 /// `watch` sees every round.
 ///
 /// The bracket is widened by what rounding may amount to: about 2e-13 / (1 - discount) of the
-/// largest value.
+/// largest value, with discount 1 2e-13 of it for each step to a goal.
 ///
 /// # Errors
-/// [`SolveError::Unbounded`] for a discount of 1 or rewards beyond a double. A budget that ends is
-/// not an error.
+/// [`SolveError::Unbounded`] for rewards beyond a double; with discount 1 what a goal problem lacks.
+/// A budget that ends is not an error.
 pub fn solve(
     model: &Pomdp,
     options: &Options,
@@ -45,10 +46,14 @@ pub fn solve(
         return Ok(found);
     };
     let states = model.states().len();
-    let alphas = Alphas::new(blind, states, model.observations().len());
-    let sawtooth = Sawtooth::new(fast.clone(), initial.corners(states));
+    let blocks = Blocks::new(model);
+    let alphas = Alphas::new(blind, states, model.observations().len(), blocks.clone());
+    let sawtooth = Sawtooth::new(fast.clone(), initial.corners(states), blocks);
     let tree = Tree::new(model, initial.tighter.as_ref(), alphas, sawtooth);
-    let rounding = initial.rounding(model);
+    let rounding = match initial.rounding(model, found.bracket.lower, budget) {
+        Err(SolveError::Stopped) => return Ok(found),
+        rounding => rounding?,
+    };
     let Ok(mut search) = Search::new(tree, rounding, budget) else {
         return Ok(found);
     };

@@ -3,18 +3,20 @@
 //! A policy that remembers nothing but the belief is a Markov chain over the beliefs that it
 //! reaches. The most probable of them are gone through; the value at the start is a linear system,
 //! in which the others are worth the smallest reward for ever, or what is earned by whoever knows
-//! the state.
+//! the state. Beliefs that are merged, as they differ by rounding, widen the bounds by what that
+//! may amount to.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::followers::Followers;
+use super::initial::trivial;
 use crate::bounds::linear::{Rows, System};
 use crate::bounds::{SolveError, contraction, mdp};
 use crate::budget::Budget;
 use crate::model::Pomdp;
 use crate::policy::Policy;
-use crate::sparse_beliefs::{BeliefId, SparseBeliefs, dot, sparse};
+use crate::sparse_beliefs::{BeliefId, MERGED, SparseBeliefs, dot, sparse};
 
 /// The value of a policy at the start belief lies between these, in units of reward.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,15 +27,18 @@ pub struct PolicyValue {
     pub upper: f64,
     /// Beliefs that were gone through.
     pub beliefs: usize,
-    /// Discounted share of the time that is spent beyond them, at most 1.
+    /// Discounted share of the time that is spent beyond them, at most 1; with discount 1 the
+    /// probability of getting there.
     pub beyond: f64,
 }
 
 /// Goes through `beliefs_max` beliefs at most, of the chain that `policy` makes of `model`. The
-/// policy must remember nothing: dual control does.
+/// policy must remember nothing: dual control does. With discount 1 it is asked at beliefs under
+/// the condition that no goal has been reached, and nothing is known of what is beyond.
 ///
 /// # Errors
-/// [`SolveError::Unbounded`] for a discount of 1; [`SolveError::Stopped`] if the budget ends.
+/// [`SolveError::Unbounded`] for a policy that never ends with discount 1, or what the model lacks
+/// of a goal problem; [`SolveError::Stopped`] if the budget ends.
 pub fn policy_value(
     model: &Pomdp,
     policy: &mut dyn Policy,
@@ -41,31 +46,49 @@ pub fn policy_value(
     budget: &mut Budget<'_>,
 ) -> Result<PolicyValue, SolveError> {
     let discount = model.discount();
-    if discount >= 1.0 {
-        return Err(SolveError::Unbounded(discount));
-    }
     let best = mdp::solve_within(model, budget)?;
     let states = 0..model.states().len();
-    let most = states.clone().map(|s| best.value(s) + best.error());
-    let rewards = states.clone().flat_map(|s| {
-        let actions = 0..model.actions().len();
-        actions.map(move |a| model.reward(s, a))
-    });
-    let least = rewards.fold(f64::INFINITY, f64::min) / (1.0 - discount);
-    let bounds = [vec![least; states.len()], most.collect()];
+    let most: Vec<f64> = states
+        .clone()
+        .map(|s| best.value(s) + best.error())
+        .collect();
+    let highest = most.iter().fold(0.0_f64, |m, v| m.max(*v));
+    let bounds = [vec![trivial(model).lower; states.len()], most];
     let walk = Walk::new(model, policy, beliefs_max, budget)?;
     let chain = Chain::new(discount, walk, &bounds);
     let [lower, upper] = &chain.earned;
-    let (lower, upper) = (chain.solve(lower, budget)?.0, chain.solve(upper, budget)?.1);
-    let rest = discount / (1.0 - discount);
-    let right: Vec<f64> = chain.beyond.iter().map(|p| p * rest).collect();
-    let beyond = chain.solve(&right, budget)?.1 * (1.0 - discount);
+    let beyond: Vec<f64> = chain.beyond.iter().map(|p| p * discount).collect();
+    let beyond = chain.solve(&beyond, budget)?.1;
+    let (steps, upper) = (chain.steps(budget)?, chain.solve(upper, budget)?.1);
+    let lower = match lower.iter().all(|v| v.is_finite()) {
+        true => chain.solve(lower, budget)?.0,
+        false => f64::NEG_INFINITY,
+    };
+    // What merged beliefs differ by, and what rows of Z exceed 1 by, of all that is to come.
+    let scale = upper
+        .abs()
+        .max(if lower.is_finite() { lower.abs() } else { 0.0 });
+    let error = (MERGED + excess_mass(model)) * steps * (scale + 2.0 * highest);
     Ok(PolicyValue {
-        lower,
-        upper,
+        lower: lower - error,
+        upper: upper + error,
         beliefs: chain.beyond.len(),
         beyond: beyond.clamp(0.0, 1.0),
     })
+}
+
+/// What the rows of Z exceed 1 by, at most.
+fn excess_mass(model: &Pomdp) -> f64 {
+    let observations = 0..model.observations().len();
+    let pairs =
+        (0..model.actions().len()).flat_map(|a| (0..model.states().len()).map(move |s| (a, s)));
+    let sum = |(a, s): (usize, usize)| -> f64 {
+        let observations = observations.clone();
+        observations.map(|z| model.likelihood(a, z)[s]).sum()
+    };
+    pairs
+        .map(sum)
+        .fold(0.0, |most, sum| f64::max(most, sum - 1.0))
 }
 
 /// The beliefs that were gone through, in order.
@@ -101,7 +124,7 @@ impl Walk {
         budget: &mut Budget<'_>,
     ) -> Result<Self, SolveError> {
         let mut walk = Self::default();
-        let mut followers = Followers::default();
+        let mut followers = Followers::new(model);
         let root = walk.store.intern(&sparse(model.start()));
         walk.place.push(None);
         let mut values = vec![0.0; model.actions().len()];
@@ -179,19 +202,31 @@ impl Chain {
     /// The value at the start: no less than the first, no more than the second, which differ by
     /// what is left of the system's error.
     fn solve(&self, right: &[f64], budget: &mut Budget<'_>) -> Result<(f64, f64), SolveError> {
+        let first = |x: Vec<f64>| x.first().copied().unwrap_or(0.0);
         let system = System {
             rows: &self.links,
             right,
             discount: self.discount,
         };
-        let x = system.solve_roughly(vec![0.0; right.len()], budget)?;
+        let guess = vec![0.0; right.len()];
+        if self.discount >= 1.0 {
+            let lower = system.solve_beside(-1.0, guess, budget)?;
+            let upper = system.solve_beside(1.0, lower.clone(), budget)?;
+            return Ok((first(lower), first(upper)));
+        }
+        let x = system.solve_roughly(guess, budget)?;
         let left = system.residual(&x).into_iter();
         let error = left.fold(0.0_f64, |most, r| most.max(r.abs()));
         let error = error / (1.0 - contraction(self.discount, self.mass_max)?);
         if !error.is_finite() {
             return Err(SolveError::Unbounded(self.discount));
         }
-        let first = x.first().copied().unwrap_or(0.0);
+        let first = first(x);
         Ok((first - error, first + error))
+    }
+
+    /// Discounted number of steps among the beliefs.
+    fn steps(&self, budget: &mut Budget<'_>) -> Result<f64, SolveError> {
+        Ok(self.solve(&vec![1.0; self.beyond.len()], budget)?.1)
     }
 }

@@ -4,6 +4,7 @@
 //! rest, so that V*(b) <= c v_i + U(rest) for any upper bound U. The usual sawtooth takes for U
 //! the plane through the corners; here it is the lower of that and the fast informed bound.
 
+use super::blocks::Blocks;
 use crate::bounds::ActionValues;
 use crate::sparse_beliefs::{BeliefId, SparseBeliefs, dot};
 
@@ -19,12 +20,15 @@ struct Point {
     slot: u32,
 }
 
-/// The points, by the instant of their last change.
+/// The points.
 #[derive(Debug, Clone)]
 pub(super) struct Sawtooth {
     base: ActionValues,
     corners: Vec<f64>,
-    points: Vec<Point>,
+    blocks: Blocks,
+    /// Of each block, then of beliefs in several, by the instant of their last change: a point says
+    /// something where its support is part of a belief's, so that only those of its block do.
+    points: Vec<Vec<Point>>,
     /// Words of a mask of states.
     words: usize,
     masks: Vec<u64>,
@@ -48,12 +52,13 @@ pub(super) struct Query<'a> {
 
 impl Sawtooth {
     /// `corners` are upper bounds where the state is certain.
-    pub(super) fn new(base: ActionValues, corners: Vec<f64>) -> Self {
+    pub(super) fn new(base: ActionValues, corners: Vec<f64>, blocks: Blocks) -> Self {
         let states = corners.len();
         Self {
             base,
             corners,
-            points: Vec::new(),
+            points: vec![Vec::new(); blocks.count() + 1],
+            blocks,
             words: states.div_ceil(64),
             masks: Vec::new(),
             based: Vec::new(),
@@ -69,12 +74,12 @@ impl Sawtooth {
     }
 
     pub(super) fn point_count(&self) -> usize {
-        self.points.len()
+        self.points.iter().map(Vec::len).sum()
     }
 
     /// Bytes that the points hold, about.
     pub(super) fn bytes(&self) -> usize {
-        8 * (self.masks.len() + self.based.len()) + size_of::<Point>() * self.points.len()
+        8 * (self.masks.len() + self.based.len()) + size_of::<Point>() * self.point_count()
     }
 
     /// The lower of the fast informed bound and the plane through the corners.
@@ -89,7 +94,7 @@ impl Sawtooth {
     pub(super) fn lower_corner(&mut self, beliefs: &SparseBeliefs, state: usize, value: f64) {
         self.corners[state] = value;
         self.stamp += 1;
-        for point in &mut self.points {
+        for point in self.points.iter_mut().flatten() {
             point.plane = dot(&self.corners, beliefs.entries(point.belief));
             point.stamp = self.stamp;
         }
@@ -104,9 +109,11 @@ impl Sawtooth {
     pub(super) fn put(&mut self, beliefs: &SparseBeliefs, belief: BeliefId, value: f64) {
         self.stamp += 1;
         let entries = beliefs.entries(belief);
-        let known = self.points.iter().rposition(|p| p.belief == belief);
+        let block = self.blocks.around(entries);
+        let block = block.unwrap_or(self.blocks.count());
+        let known = self.points[block].iter().rposition(|p| p.belief == belief);
         let slot = match known {
-            Some(at) => self.points.remove(at).slot,
+            Some(at) => self.points[block].remove(at).slot,
             None => {
                 let first = self.masks.len();
                 self.masks.resize(first + self.words, 0);
@@ -121,7 +128,7 @@ impl Sawtooth {
             }
         };
         let plane = dot(&self.corners, entries);
-        self.points.push(Point {
+        self.points[block].push(Point {
             stamp: self.stamp,
             belief,
             value,
@@ -140,8 +147,12 @@ impl Sawtooth {
         let strongest = at.iter().position(|v| *v == fast).unwrap_or(0);
         let plane = dot(&self.corners, query.entries);
         let (mut best, mut work) = (query.value.min(fast).min(plane), at.len());
-        let newer = self.points.iter().rev();
-        for point in newer.take_while(|point| point.stamp > query.seen) {
+        let lists = self.lists(query.entries).iter();
+        let newer = lists.flat_map(|points| {
+            let newest_first = points.iter().rev();
+            newest_first.take_while(|point| point.stamp > query.seen)
+        });
+        for point in newer {
             work += 2;
             let slot = point.slot as usize;
             let masks = self.masks[slot * self.words..][..self.words].iter();
@@ -184,7 +195,7 @@ impl Sawtooth {
     ) -> (Option<(BeliefId, f64)>, usize) {
         self.enter(belief);
         let (mut best, mut fall_max, mut work) = (None, 0.0, 0);
-        for point in &self.points {
+        for point in self.lists(belief).iter().flatten() {
             work += 2;
             let masks = self.masks[point.slot as usize * self.words..][..self.words].iter();
             if masks.zip(&self.mask).any(|(m, q)| m & !q != 0) {
@@ -208,6 +219,14 @@ impl Sawtooth {
         (best, work)
     }
 
+    /// The points that may say something of a belief.
+    fn lists(&self, belief: &[(u32, f64)]) -> &[Vec<Point>] {
+        match self.blocks.around(belief) {
+            Some(block) => &self.points[block..=block],
+            None => &self.points,
+        }
+    }
+
     /// Makes a belief the one that is being valued.
     fn enter(&mut self, belief: &[(u32, f64)]) {
         self.mask.fill(0);
@@ -225,11 +244,13 @@ impl Sawtooth {
 
     /// Takes out points that the others make superfluous.
     pub(super) fn retain(&mut self, keep: impl Fn(BeliefId, f64) -> bool) {
-        self.points.retain(|p| keep(p.belief, p.value));
+        for points in &mut self.points {
+            points.retain(|p| keep(p.belief, p.value));
+        }
     }
 
     /// Beliefs of the points.
     pub(super) fn beliefs(&self) -> impl Iterator<Item = BeliefId> {
-        self.points.iter().map(|p| p.belief)
+        self.points.iter().flatten().map(|p| p.belief)
     }
 }

@@ -52,7 +52,7 @@ pub(super) struct Tree<'m> {
     pub sawtooth: Sawtooth,
     /// Backups of the lower bound try every action, not only the most promising ones.
     pub is_thorough: bool,
-    followers: Followers,
+    pub followers: Followers,
 }
 
 impl<'m> Tree<'m> {
@@ -72,7 +72,7 @@ impl<'m> Tree<'m> {
             alphas,
             sawtooth,
             is_thorough: false,
-            followers: Followers::default(),
+            followers: Followers::new(model),
         }
     }
 

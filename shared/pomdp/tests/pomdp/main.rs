@@ -7,6 +7,7 @@ mod bounds;
 mod despot;
 mod dual;
 mod examples;
+mod goals;
 mod grammar;
 mod hostile;
 mod inspection;

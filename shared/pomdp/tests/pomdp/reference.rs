@@ -1,7 +1,11 @@
 //! Against exact answers worked by hand, and the reference values of public models.
 
-use vigil_pomdp::policy::{choose, choose_among};
-use vigil_pomdp::{ActionVoting, Evidence, MostLikelyState, Policy, Pomdp, QMdp, Tracker, mdp};
+use vigil_pomdp::bounds::fib;
+use vigil_pomdp::policy::{FastInformed, choose, choose_among};
+use vigil_pomdp::{
+    ActionVoting, AlphaVectors, Budget, Evidence, MostLikelyState, PointBased, Policy, Pomdp, QMdp,
+    Tracker, mdp,
+};
 
 use crate::public;
 use crate::public::TIGER;
@@ -39,28 +43,54 @@ fn the_other_policies_follow_their_definitions() {
     let solution = mdp::solve(&Pomdp::parse(TIGER).unwrap()).unwrap();
     let mut values = [0.0; 3];
     // A tiger on the left: open the right door.
-    let mls = MostLikelyState::new(solution.clone()).evaluate(&[0.6, 0.4], &mut values);
+    let mls = MostLikelyState::new(&solution).evaluate(&[0.6, 0.4], &mut values);
     assert_eq!((mls.action, values), (2, [0.0, 0.0, 0.6]));
-    let av = ActionVoting::new(solution.clone()).evaluate(&[0.3, 0.7], &mut values);
+    let av = ActionVoting::new(&solution).evaluate(&[0.3, 0.7], &mut values);
     assert_eq!((av.action, values), (1, [0.0, 0.7, 0.3]));
     assert!((av.margin - 0.4).abs() < 1e-15);
-    // An exact tie: the first state, hence its door.
-    let tie = MostLikelyState::new(solution).evaluate(&[0.5, 0.5], &mut values);
-    assert_eq!(tie.action, 2);
+    // An exact tie of both doors, in votes too: the lowest index.
+    let tie = MostLikelyState::new(&solution).evaluate(&[0.5, 0.5], &mut values);
+    assert_eq!((tie.action, tie.margin), (1, 0.0));
 }
 
 #[test]
 fn ties_go_to_the_lowest_index_and_rounding_does_not_break_them() {
-    assert_eq!(choose(&[1.0, 3.0, 2.0]).action, 1);
-    assert_eq!(choose(&[1.0, 3.0, 2.0]).margin, 1.0);
-    let tie = choose(&[0.0, 0.3, 0.1 + 0.2]);
+    assert_eq!(choose(&[1.0, 3.0, 2.0], &[]).action, 1);
+    assert_eq!(choose(&[1.0, 3.0, 2.0], &[]).margin, 1.0);
+    let tie = choose(&[0.0, 0.3, 0.1 + 0.2], &[]);
     assert_eq!(tie.action, 1);
     assert!(tie.margin >= 0.0 && tie.margin < 1e-15);
-    assert_eq!(choose(&[1e6, 1e6 + 1e-4]).action, 0);
-    assert_eq!(choose(&[1e6, 1e6 + 1e-2]).action, 1);
-    assert_eq!(choose(&[f64::NAN, -1.0]).action, 1);
-    assert_eq!(choose_among(&[1.0, 3.0, 2.0], |a| a != 1).action, 2);
-    assert_eq!(choose(&[]).margin, 0.0);
+    assert_eq!(choose(&[1e6, 1e6 + 1e-4], &[]).action, 0);
+    assert_eq!(choose(&[1e6, 1e6 + 1e-2], &[]).action, 1);
+    assert_eq!(choose(&[f64::NAN, -1.0], &[]).action, 1);
+    assert_eq!(choose_among(&[1.0, 3.0, 2.0], &[], |a| a != 1).action, 2);
+    assert_eq!(choose(&[], &[]).margin, 0.0);
+}
+
+#[test]
+fn the_states_votes_break_ties_of_every_policy() {
+    // One step is all that counts. At equal weights both actions are worth 1; a alone speaks for
+    // the first, b and c for the second.
+    let text = "discount: 0 values: reward states: a b c actions: 2 observations: 1 T: * identity\n\
+                O: * uniform R: 0 : a : * : * 3 R: 1 : b : * : * 1 R: 1 : c : * : * 2\n";
+    let model = Pomdp::parse(text).unwrap();
+    let solution = mdp::solve(&model).unwrap();
+    let fast = fib::solve(&model, &mut Budget::new(&mut || false)).unwrap();
+    let vectors = [(0, vec![3.0, 0.0, 0.0]), (1, vec![0.0, 1.0, 2.0])];
+    let vectors = AlphaVectors::new(3, 2, vectors).unwrap();
+    let policies: [Box<dyn Policy>; 3] = [
+        Box::new(QMdp::new(solution)),
+        Box::new(FastInformed::new(fast)),
+        Box::new(PointBased::new(&model, &vectors).unwrap()),
+    ];
+    for mut policy in policies {
+        let mut chosen = |belief: [f64; 3]| policy.evaluate(&belief, &mut [0.0; 2]).action;
+        assert_eq!(chosen([1.0 / 3.0; 3]), 1);
+        // No tie: 1.5 against 0.75.
+        assert_eq!(chosen([0.5, 0.25, 0.25]), 0);
+        // A tie, both are worth 1.2.
+        assert_eq!(chosen([0.4, 0.0, 0.6]), 1);
+    }
 }
 
 #[test]

@@ -15,7 +15,7 @@ fn pick(u: f64, probabilities: impl IntoIterator<Item = f64>) -> usize {
 }
 
 /// Mean and standard error of what the policy of these vectors earns; an episode ends where the
-/// discount has fallen below `weight_min`.
+/// discount has fallen below `weight_min`, or at a goal.
 pub fn earned(
     model: &Pomdp,
     vectors: &AlphaVectors,
@@ -30,7 +30,7 @@ pub fn earned(
             let mut tracker = Tracker::new(model);
             let mut state = pick(rng.random(), model.start().iter().copied());
             let (mut sum, mut weight) = (0.0, 1.0);
-            while weight > weight_min {
+            while weight > weight_min && !model.is_goal(state) {
                 let a = policy.evaluate(tracker.belief(), &mut values).action;
                 sum += weight * model.reward(state, a);
                 weight *= model.discount();

@@ -167,3 +167,61 @@ fn a_policys_value_is_bounded_and_sampled() {
     let refused = value(&[]);
     assert_eq!(refused.status.code(), Some(2), "{refused:?}");
 }
+
+#[test]
+fn a_goal_problem_is_solved_valued_and_simulated_with_discount_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (file, policy, missions) = (path("search.pomdp"), path("p.json"), path("missions"));
+    // Left with 3/4, else right; a look costs 1 and never misses: 1.25 looks.
+    let text = "discount: 1\nvalues: cost\nstates: left right found\n\
+        actions: look-left look-right\nobservations: nothing it\nstart: 0.75 0.25 0\n\
+        T: * identity\nT: look-left : left 0 0 1\nT: look-right : right 0 0 1\n\
+        O: * : * 1 0\nO: * : found 0 1\nR: * : left : * : * 1\nR: * : right : * : * 1\n";
+    fs::write(&file, text).unwrap();
+    let solved = document(&[&file, "--precision", "1e-6", "--out", &policy]);
+    assert_eq!(solved["ended"], "precision");
+    for key in ["lower", "upper", "policy_lower"] {
+        assert!(
+            (solved[key].as_f64().unwrap() + 1.25).abs() < 1e-6,
+            "{solved}"
+        );
+    }
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_vigil-lab"));
+        command.arg("pomdp").args(arguments).output().unwrap()
+    };
+    let valued = run(&["value", &file, &policy, "--json", "--episodes", "400"]);
+    let valued: Value = serde_json::from_slice(&valued.stdout).unwrap();
+    for key in ["lower", "upper"] {
+        assert!(
+            (valued[key].as_f64().unwrap() + 1.25).abs() < 1e-6,
+            "{valued}"
+        );
+    }
+    assert!(
+        (valued["mean"].as_f64().unwrap() + 1.25).abs() < 0.15,
+        "{valued}"
+    );
+    let arguments = ["simulate", &file, "--policy", "qmdp", "--out", &missions];
+    assert!(run(&arguments).status.success());
+    let lines = fs::read_to_string(&missions).unwrap();
+    // A mission ends where it is found, at the second look at the latest.
+    assert!(
+        lines
+            .lines()
+            .skip(1)
+            .all(|line| line.matches("look-").count() <= 2)
+    );
+    fs::write(
+        &file,
+        text.replace("look-left : left 0 0 1", "look-left : left 1 0 0"),
+    )
+    .unwrap();
+    let refused = run(&["solve", &file]);
+    let message = String::from_utf8(refused.stderr).unwrap();
+    assert!(
+        !refused.status.success() && message.contains("from 'left' there is none"),
+        "{message}"
+    );
+}

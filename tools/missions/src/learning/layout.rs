@@ -63,7 +63,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// The layout of a model, and the model's probabilities in it, rows normalised.
+    /// The layout of a model, and the model's probabilities in it.
     pub(super) fn new(model: &Pomdp) -> (Self, Vec<f64>) {
         let (n, k) = (model.states().len(), model.observations().len());
         let actions = model.actions().len();
@@ -106,8 +106,6 @@ impl Layout {
             self.columns.push(column as u32);
             values.push(p);
         }
-        let sum: f64 = values[first..].iter().sum();
-        values[first..].iter_mut().for_each(|p| *p /= sum);
         self.starts.push(values.len() as u32);
         first..values.len()
     }

@@ -19,7 +19,8 @@ pub struct Rules {
 }
 
 impl Rules {
-    /// No action ends it: it goes on until the discount is below 1e-4, or for `cap` steps.
+    /// No action ends it: it goes on until a goal is reached, the discount is below 1e-4, or for
+    /// `cap` steps.
     #[must_use]
     pub fn endless(model: &Pomdp, cap: usize) -> Self {
         Self {
@@ -44,7 +45,7 @@ pub struct Mission {
     pub stalled_steps: usize,
     /// Observations that were impossible in the agent's eyes.
     pub impossible: usize,
-    /// True if an action ended it, and not the horizon.
+    /// True if an action or a goal ended it, and not the horizon.
     pub is_ended: bool,
 }
 
@@ -108,7 +109,8 @@ pub fn run_watched(
         mission.steps += 1;
         mission.dual_steps += usize::from(act.control == Control::Dual);
         mission.stalled_steps += usize::from(act.control == Control::Stalled);
-        mission.is_ended = rules.is_end.get(act.action).copied().unwrap_or(false);
+        let is_end = rules.is_end.get(act.action).copied().unwrap_or(false);
+        mission.is_ended = is_end || model.is_goal(world.state());
         if !mission.is_ended {
             mission.impossible += usize::from(!agent.notice(act.action, event.observation));
         }

@@ -20,7 +20,7 @@ mod tree;
 
 pub use options::{DespotError, DespotOptions};
 
-use super::{Choice, PointBased, Policy, choose};
+use super::{Choice, PointBased, Policy, Votes, choose};
 use crate::bounds::mdp::Solution;
 use crate::model::Pomdp;
 use generator::Generator;
@@ -47,6 +47,7 @@ pub struct Despot {
     is_planned: bool,
     /// True if the search for this belief began with the last decision.
     is_fresh: bool,
+    votes: Votes,
 }
 
 impl Despot {
@@ -90,6 +91,7 @@ impl Despot {
             belief: vec![0.0; model.states().len()],
             is_planned: false,
             is_fresh: false,
+            votes: Votes::new(solution),
             generator,
         })
     }
@@ -151,7 +153,7 @@ impl Policy for Despot {
                 *value = value.max(worth);
             }
         }
-        choose(values)
+        choose(values, self.votes.count(belief))
     }
 
     fn improve(&mut self, belief: &[f64]) {

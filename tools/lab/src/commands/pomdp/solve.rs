@@ -28,6 +28,10 @@ const PROGRESS_FIRST_S: f64 = 0.25;
 /// Upper bounds are mdp (the state is known), qmdp (known after one step), fib (fast informed
 /// bound) and tib (tighter informed bound). blind (one action for ever) is a lower bound. sarsop
 /// gives both bounds and a policy. Ctrl-C ends a search early and keeps its result so far.
+///
+/// A discount of 1 is taken for goal problems: some states are goals, which no action leaves and in
+/// which nothing is earned; from every state there is a way to one; and never to get there costs
+/// without bound.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model (.pomdp or .pomdpx).

@@ -19,7 +19,8 @@ const STEPS_MAX: usize = 1_000_000;
 /// Says what a policy of `vigil pomdp solve` earns from the start belief.
 ///
 /// For certain: between two bounds, by going through the beliefs that it reaches, the most probable
-/// first. Sampled: the mean over simulated missions, with its 95 % interval.
+/// first. Sampled: the mean over simulated missions, with its 95 % interval. With discount 1 a
+/// mission ends at a goal, and what is beyond those beliefs has no lower bound.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model (.pomdp or .pomdpx).
@@ -47,7 +48,7 @@ struct Document {
     file: String,
     model_hash: String,
     policy: String,
-    /// Bounds that hold for certain.
+    /// Bounds that hold for certain; null if there is none.
     lower: f64,
     upper: f64,
     /// Beliefs that were gone through.
@@ -66,7 +67,7 @@ struct Document {
 /// Values the policy, and prints the result.
 ///
 /// # Errors
-/// A model or a policy that is refused; a discount of 1.
+/// A model or a policy that is refused; with discount 1 a policy that never ends.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let model = load(&args.file)?;
     let mut policy = solved::load(&model, "POLICY", &args.policy)?;
