@@ -38,8 +38,8 @@ pub(crate) fn rounding(terms: usize) -> f64 {
 }
 
 /// What is added to every step, relative to the largest value, until the result of policy iteration
-/// is certainly beyond its own backup, which may be off by `error`: with a discount below 1 nothing,
-/// as what is left is accounted for otherwise; with 1 ever more.
+/// is certainly beyond its own backup, which may be off by `error`: with a discount below 1
+/// nothing, as what is left is accounted for otherwise; with 1 ever more.
 pub(crate) fn slacks(discount: f64, error: f64) -> impl Iterator<Item = f64> {
     let count = if discount < 1.0 { 1 } else { SLACKS };
     let first = if discount < 1.0 { 0.0 } else { 8.0 * error };

@@ -3,9 +3,10 @@
 //! With discount 1 the values are those of a stochastic shortest path (Bertsekas and Tsitsiklis,
 //! Mathematics of Operations Research 16(3), 1991): a policy is proper if it gets from every state
 //! to a goal, with probability 1. There must be one, and every other policy must pay for never
-//! getting there, without bound. Then policy iteration that begins with a proper policy ends at
-//! the one solution. A vector that is no more than its own backup, and nothing at goals, is a lower
-//! bound then, one that is no less an upper one: what still goes on is paid for, or comes to an end.
+//! getting there, without bound. Then policy iteration that begins with a proper policy ends at the
+//! one solution. A vector that is no more than its own backup, and nothing at goals, is a lower
+//! bound then, one that is no less an upper one: what still goes on is paid for, or comes to an
+//! end.
 
 use super::SolveError;
 use crate::model::Pomdp;

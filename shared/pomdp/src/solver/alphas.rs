@@ -28,7 +28,8 @@ pub(super) struct Alphas {
 }
 
 impl Alphas {
-    /// Begins with the blind policies. With discount 1 what they go on with is a lot, of all of them.
+    /// Begins with the blind policies. With discount 1 what they go on with is a lot, of all of
+    /// them.
     pub(super) fn new(
         blind: &ActionValues,
         states: usize,

@@ -1,10 +1,10 @@
 //! What is observed of the state for certain.
 //!
 //! Two states that may follow upon one action with one observation may be mistaken for each other.
-//! The classes of that relation are blocks: after an observation a belief lies in one of them. Where
-//! part of the state is observed (a mixed observable model: Ong, Png, Hsu and Lee, IJRR 29(8), 2010)
-//! there are many, and a belief has to do with the points and vectors of its own alone. No variables
-//! have to be declared for that.
+//! The classes of that relation are blocks: after an observation a belief lies in one of them.
+//! Where part of the state is observed (a mixed observable model: Ong, Png, Hsu and Lee, IJRR
+//! 29(8), 2010) there are many, and a belief has to do with the points and vectors of its own
+//! alone. No variables have to be declared for that.
 
 use crate::model::Pomdp;
 

@@ -52,8 +52,8 @@ pub struct Compact {
     pub loss_error: f64,
 }
 
-/// A policy of at most `vectors_max` of `vectors`. With discount 1 it is all of them if so few do not
-/// come to an end. Equal inputs give equal policies.
+/// A policy of at most `vectors_max` of `vectors`. With discount 1 it is all of them if so few do
+/// not come to an end. Equal inputs give equal policies.
 ///
 /// # Errors
 /// [`SolveError::Stopped`] if the budget ends.
@@ -252,8 +252,8 @@ impl<'m> Choice<'m> {
         })
     }
 
-    /// One run: what it loses, and its steps. What is left of one that is cut off is thought to lose
-    /// in each step what its second half did; with discount 1, without bound.
+    /// One run: what it loses, and its steps. What is left of one that is cut off is thought to
+    /// lose in each step what its second half did; with discount 1, without bound.
     fn run_once(
         &mut self,
         random: &mut Pcg64Mcg,
@@ -318,8 +318,8 @@ impl<'m> Choice<'m> {
         Ok(stays)
     }
 
-    /// The belief that follows where a number between 0 and 1 says what is observed; none if that is
-    /// a goal.
+    /// The belief that follows where a number between 0 and 1 says what is observed; none if that
+    /// is a goal.
     fn draw(
         &mut self,
         belief: &[(u32, f64)],

@@ -119,7 +119,8 @@ impl Choices {
 
 impl Tree<'_> {
     /// The beliefs of the process: those that are expanded, or, where points stand for what is
-    /// outside, the points and the corners alone, by every action that may be the best.
+    /// outside, the points and the corners alone, by every action that may be the best, unless the
+    /// memory ends: what is not expanded keeps its bound.
     fn process(
         &mut self,
         outside: Outside,
@@ -141,6 +142,9 @@ impl Tree<'_> {
             return Ok(ids);
         }
         for id in &ids {
+            if self.bytes() > self.bytes_max {
+                break;
+            }
             let lower = self.lower(*id, budget)?;
             let first = self.branches_of(*id, budget)?;
             for action in 0..self.model.actions().len() {
@@ -333,5 +337,46 @@ impl Tree<'_> {
             }
         }
         Err(SolveError::Unbounded(discount))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::alphas::Alphas;
+    use super::super::blocks::Blocks;
+    use super::super::initial::Initial;
+    use super::super::sawtooth::Sawtooth;
+    use super::*;
+    use crate::model::Pomdp;
+    use crate::sparse_beliefs::sparse;
+
+    #[test]
+    fn points_are_expanded_only_while_there_is_memory() {
+        let text = "discount: 0.95 states: a b c actions: 2 observations: 2 T: 0 uniform
+            T: 1 : a 0.5 0.25 0.25 T: 1 : b 0 1 0 T: 1 : c 0.25 0.5 0.25
+            O: * : a 0.75 0.25 O: * : b 0.5 0.5 O: * : c 0.125 0.875
+            R: 0 : a : * : * 1 R: 1 : c : * : * 2";
+        let model = Pomdp::parse(text).unwrap();
+        let mut stop = || false;
+        let budget = &mut Budget::new(&mut stop);
+        let grown = |bytes_max: usize, budget: &mut Budget<'_>| {
+            let initial = Initial::new(&model, budget).unwrap();
+            let (blind, fast) = (
+                initial.blind.as_ref().unwrap(),
+                initial.fast.clone().unwrap(),
+            );
+            let blocks = Blocks::new(&model);
+            let alphas = Alphas::new(blind, 3, 2, blocks.clone());
+            let sawtooth = Sawtooth::new(fast, initial.corners(3), blocks);
+            let mut tree = Tree::new(&model, initial.tighter.as_ref(), alphas, sawtooth);
+            let root = tree.node(&sparse(model.start()), budget).unwrap();
+            tree.walk(root, 0.0, budget).unwrap();
+            let before = tree.children.len();
+            tree.bytes_max = bytes_max;
+            tree.process(Outside::Points, budget).unwrap();
+            tree.children.len() - before
+        };
+        assert_eq!(grown(0, budget), 0);
+        assert!(grown(usize::MAX, budget) > 0);
     }
 }

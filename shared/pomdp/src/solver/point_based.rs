@@ -22,8 +22,8 @@ const REWARD_MAX: f64 = 1e290;
 /// largest value, with discount 1 2e-13 of it for each step to a goal.
 ///
 /// # Errors
-/// [`SolveError::Unbounded`] for rewards beyond a double; with discount 1 what a goal problem lacks.
-/// A budget that ends is not an error.
+/// [`SolveError::Unbounded`] for rewards beyond a double; with discount 1 what a goal problem
+/// lacks. A budget that ends is not an error.
 pub fn solve(
     model: &Pomdp,
     options: &Options,

@@ -109,12 +109,13 @@ impl<'m> Search<'m> {
         budget: &mut Budget<'_>,
         watch: &mut dyn FnMut(&Progress),
     ) -> EndReason {
+        self.tree.bytes_max = options.memory_bytes_max;
         loop {
             watch(&self.progress);
             if self.progress.bracket.gap() <= options.precision {
                 return EndReason::Precision;
             }
-            if self.tree.bytes() > options.memory_bytes_max {
+            if self.tree.bytes() > self.tree.bytes_max {
                 return EndReason::Memory;
             }
             if self.round(options, budget).is_err() {

@@ -52,6 +52,8 @@ pub(super) struct Tree<'m> {
     pub sawtooth: Sawtooth,
     /// Backups of the lower bound try every action, not only the most promising ones.
     pub is_thorough: bool,
+    /// What [`Self::bytes`] may be: beyond it nothing is expanded that could be left.
+    pub bytes_max: usize,
     pub followers: Followers,
 }
 
@@ -72,6 +74,7 @@ impl<'m> Tree<'m> {
             alphas,
             sawtooth,
             is_thorough: false,
+            bytes_max: usize::MAX,
             followers: Followers::new(model),
         }
     }

@@ -1,7 +1,7 @@
 //! Deep inspection: cheap repeated tests before an act that is dear to get wrong.
 
 use vigil_pomdp::solver::{EndReason, compact, policy_value};
-use vigil_pomdp::{Budget, Choice, Control, PointBased, Policy, Pomdp, QMdp, mdp};
+use vigil_pomdp::{AlphaVectors, Budget, Choice, Control, PointBased, Policy, Pomdp, QMdp, mdp};
 
 use crate::public::{self, TIGER};
 use crate::simulation::earned;
@@ -157,4 +157,25 @@ fn what_a_policy_earns_lies_between_its_bounds() {
     );
     let endless = Pomdp::parse(&TIGER.replace("0.95", "1")).unwrap();
     assert!(policy_value(&endless, listen, 10, &mut budget).is_err());
+}
+
+#[test]
+fn what_a_small_policy_loses_is_sampled_near_discount_one_too() {
+    // A seen coin: calling it right brings 1. One vector alone calls one side for ever, and is
+    // wrong half the time; a run to the end of the discount would take a million steps.
+    let text = "discount: 0.99999 states: 2 actions: 2 observations: 2 T: * uniform
+        O: * 1 0 0 1 R: 0 : 0 : * : * 1 R: 1 : 1 : * : * 1";
+    let model = Pomdp::parse(text).unwrap();
+    let after = 0.99999 / 1e-5;
+    let vectors = [(0, [1.0 + after, after]), (1, [after, 1.0 + after])];
+    let vectors = AlphaVectors::new(2, 2, vectors).unwrap();
+    let mut stop = || false;
+    let small = compact(&model, &vectors, 1, &mut Budget::new(&mut stop)).unwrap();
+    assert_eq!(small.vectors.len(), 1);
+    let off = (small.loss_mean - 0.5 / 1e-5).abs();
+    assert!(
+        small.loss_error > 0.0 && off < 4.0 * small.loss_error,
+        "{small:?}"
+    );
+    assert!(small.loss_error < 0.02 * small.loss_mean, "{small:?}");
 }

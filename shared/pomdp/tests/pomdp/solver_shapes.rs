@@ -149,3 +149,36 @@ fn what_the_tighter_bound_has_no_room_for_is_solved_without_it() {
     );
     assert!(bracket.gap() < 1e-2, "{bracket:?}");
 }
+
+#[test]
+fn what_is_observed_beside_a_problem_changes_nothing() {
+    // The tiger in one of so many houses, seen from inside; a door leads into any. The start belief
+    // is over all houses.
+    for houses in [1, 2, 7] {
+        let (mut states, mut seen, mut rules) = (String::new(), String::new(), String::new());
+        for h in 0..houses {
+            write!(states, " left{h} right{h}").unwrap();
+            write!(seen, " hear-left{h} hear-right{h}").unwrap();
+            for (side, other) in [("left", "right"), ("right", "left")] {
+                for (o, p) in [(side, 0.85), (other, 0.15)] {
+                    writeln!(rules, "O: listen : {side}{h} : hear-{o}{h} {p}").unwrap();
+                    writeln!(rules, "O: open-left : {side}{h} : hear-{o}{h} 0.5").unwrap();
+                    writeln!(rules, "O: open-right : {side}{h} : hear-{o}{h} 0.5").unwrap();
+                }
+                writeln!(rules, "R: open-{side} : {side}{h} : * : * -100").unwrap();
+                writeln!(rules, "R: open-{side} : {other}{h} : * : * 10").unwrap();
+            }
+        }
+        let text = format!(
+            "discount: 0.95 states:{states} actions: listen open-left open-right
+             observations:{seen} T: listen identity T: open-left uniform T: open-right uniform
+             R: listen : * : * : * -1\n{rules}"
+        );
+        let bracket = solved(&Pomdp::parse(&text).unwrap(), 100_000).bracket;
+        assert!(bracket.gap() < 1e-4, "{houses}: {bracket:?}");
+        // That of the tiger alone.
+        let value = 19.371_368_38;
+        let is_inside = bracket.lower < value + 1e-8 && value - 1e-8 < bracket.upper;
+        assert!(is_inside, "{houses}: {bracket:?}");
+    }
+}
