@@ -10,8 +10,8 @@
 //! A trial looks one step further at one leaf, the one with the widest gap that the most promising
 //! actions may lead to (Ross et al. 2008): so its cost is bounded.
 //!
-//! A tree is dropped when the belief moves. What is planned depends on the belief that it began with,
-//! the seed and the number of trials; not on earlier beliefs, and not on a clock.
+//! A tree is dropped when the belief moves. What is planned depends on the belief that it began
+//! with, the seed and the number of trials; not on earlier beliefs, and not on a clock.
 
 mod generator;
 mod options;
