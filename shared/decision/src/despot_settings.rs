@@ -9,18 +9,17 @@ use vigil_pomdp::policy::DespotOptions;
 #[derive(Debug, Clone, Copy, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DespotSettings {
-    /// Scenarios of a belief. More cost time in proportion; fewer plan for the luck of a few. Each
-    /// state that is possible has one of its own if there are enough.
-    #[default(16)]
+    /// Scenarios of a belief. With as many as the decision model has states, plans are exact.
+    #[default(64)]
     #[schemars(range(min = 1, max = 1000))]
     pub scenarios: u32,
     /// Trials of a decision about a new belief, and of each cycle in which the belief stands. Each
     /// looks one step further. Too many for a cycle are refused.
-    #[default(4)]
+    #[default(5)]
     #[schemars(range(min = 1, max = 1000))]
     pub trials: u32,
     /// Nodes of the tree of a belief: once they are used up, its plan stands.
-    #[default(10_000)]
+    #[default(20_000)]
     #[schemars(range(min = 100, max = 1_000_000))]
     pub nodes: u32,
     /// Seed of the scenarios. Equal journals and seeds give equal actions.

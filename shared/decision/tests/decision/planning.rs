@@ -101,7 +101,7 @@ fn searches_that_no_cycle_has_time_for_are_refused_with_line_key_and_reason() {
     let message = load("rover.toml", |settings| settings.despot.trials = 1000)
         .err()
         .unwrap();
-    let part = "supervisor.despot.trials: 1000 trials with 16 scenarios take";
+    let part = "supervisor.despot.trials: 1000 trials with 64 scenarios take";
     assert!(message.contains(part), "{message}");
     assert!(
         message.contains("allowed are 200000: choose fewer of either"),

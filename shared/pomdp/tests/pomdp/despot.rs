@@ -7,7 +7,7 @@ use vigil_pomdp::{AlphaVectors, Budget, Despot, PointBased, Policy, Pomdp, mdp};
 
 use crate::public::TIGER;
 
-/// Nothing moves, so that scenarios are exact: look at a lamp, or say which it is.
+/// Look at a lamp, or say which it is. Nothing moves.
 const LAMP: &str = "discount: 0.6\nvalues: reward\nstates: red green blue\n\
     actions: look red green blue\nobservations: warm cold\nstart: 0.5 0.3 0.2\nT: * identity\n\
     O: * uniform\nO: look\n0.9 0.1\n0.2 0.8\n0.4 0.6\nR: look : * : * : * -1\n\
@@ -86,7 +86,7 @@ fn a_tiger_is_listened_to_in_doubt_and_its_choices_are_those_of_the_exact_policy
 }
 
 #[test]
-fn where_scenarios_are_exact_the_bounds_hold_the_exact_value_and_close() {
+fn with_a_scenario_for_each_state_the_bounds_hold_the_exact_value_and_close() {
     for belief in [
         [0.5, 0.3, 0.2],
         [0.2, 0.4, 0.4],
@@ -121,17 +121,16 @@ fn where_scenarios_are_exact_the_bounds_hold_the_exact_value_and_close() {
 
 #[test]
 fn equal_seeds_and_calls_give_equal_bits_whatever_was_decided_before() {
-    let model = parse(TIGER);
+    let model = parse(LAMP);
+    // Fewer scenarios than states, so that there is something to sample.
     let seeded = |seed| {
-        planner(
-            &model,
-            &DespotOptions {
-                seed,
-                ..options(20, 50)
-            },
-        )
+        let options = DespotOptions {
+            seed,
+            ..options(2, 20)
+        };
+        planner(&model, &options)
     };
-    let mut values = [0.0; 3];
+    let mut values = [0.0; 4];
     let mut bits = |policy: &mut Despot, belief: &[f64]| {
         policy.evaluate(belief, &mut values);
         policy.improve(belief);
@@ -141,17 +140,17 @@ fn equal_seeds_and_calls_give_equal_bits_whatever_was_decided_before() {
     };
     let (mut one, mut same, mut other) = (seeded(1), seeded(1), seeded(2));
     let mut differs = false;
-    for left in [0.5, 0.85, 0.1, 0.97, 0.3] {
-        let belief = [left, 1.0 - left];
+    for red in [0.5, 0.35, 0.1, 0.6, 0.3] {
+        let belief = [red, 0.7 - red, 0.3];
         let ours = bits(&mut one, &belief);
         assert_eq!(ours, bits(&mut same, &belief));
         assert_eq!(ours, bits(&mut seeded(1), &belief));
         differs |= ours != bits(&mut other, &belief);
     }
     assert!(differs);
-    let first = bits(&mut one, &[0.5, 0.5]);
+    let first = bits(&mut one, &[0.5, 0.2, 0.3]);
     one.reset();
-    assert_eq!(first, bits(&mut one, &[0.5, 0.5]));
+    assert_eq!(first, bits(&mut one, &[0.5, 0.2, 0.3]));
 }
 
 #[test]
@@ -264,8 +263,10 @@ fn the_planner_goes_by_its_name_and_refuses_what_no_search_can_do() {
     ));
     let large = refused(|o| o.nodes = usize::MAX);
     assert!(matches!(large, DespotError::Memory { .. }), "{large}");
-    // 3 actions, 2 observations, upper and lower bounds of 3 actions.
-    assert_eq!(good.products(&model, None), 10 * 10 * 3 * 2 * 6);
+    // Ten trials, three actions: two states with two successors; two observations of each, with
+    // an upper and a lower bound of each action.
+    let products = 10 * 3 * (2 * 2 + 2 * 2 * 6);
+    assert_eq!(good.products(&model, None), products);
 }
 
 proptest! {

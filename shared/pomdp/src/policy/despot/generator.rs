@@ -1,5 +1,5 @@
-//! The model as scenarios need it: successors by a random number, the observations that a state can
-//! give, and what plans are worth in a state.
+//! The model as a search needs it: what can be observed in a state, and what plans are worth in it,
+//! side by side.
 
 use crate::bounds::{ActionValues, SolveError, blind, fib, mdp};
 use crate::budget::Budget;
@@ -25,14 +25,14 @@ impl Table {
     }
 }
 
-/// A generative model, and its bounds state by state.
+/// The model, and its bounds state by state.
 #[derive(Debug, Clone)]
 pub(super) struct Generator {
     pub states: usize,
     pub actions: usize,
     pub observations: usize,
     pub discount: f64,
-    /// For (a, s) at a * states + s: (s', sum of T(s,a,.) up to s').
+    /// For (a, s) at a * states + s: (s', T(s,a,s')).
     successors: Table,
     /// For (a, s') at a * states + s': (z, Z(a,s',z)), z ascending.
     observed: Table,
@@ -91,13 +91,9 @@ impl Generator {
         self.rewards[action * self.states + state as usize]
     }
 
-    /// The successor that a random number in [0, 1) chooses.
-    pub(super) fn successor(&self, state: u32, action: usize, chance: f64) -> u32 {
-        let row = self.successors.row(action * self.states + state as usize);
-        // A row sums to 1 but for the tolerance of the reader.
-        let level = chance * row.last().map_or(1.0, |last| last.1);
-        let at = row.partition_point(|(_, sum)| *sum <= level);
-        row.get(at).or(row.last()).map_or(state, |next| next.0)
+    /// (s', T(s,a,s')).
+    pub(super) fn successors(&self, state: u32, action: usize) -> &[(u32, f64)] {
+        self.successors.row(action * self.states + state as usize)
     }
 
     /// (z, Z(a,s',z)) of what can be observed; z ascends.
@@ -144,11 +140,8 @@ fn successors(model: &Pomdp) -> Table {
     let mut table = Table::default();
     for a in 0..model.actions().len() {
         for s in 0..model.states().len() {
-            let mut sum = 0.0;
-            for &(to, p) in model.successors(s, a) {
-                sum += p;
-                table.entries.push((to as u32, sum));
-            }
+            let row = model.successors(s, a).iter();
+            table.entries.extend(row.map(|(to, p)| (*to as u32, *p)));
             table.end_row();
         }
     }

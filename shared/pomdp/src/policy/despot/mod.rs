@@ -1,17 +1,18 @@
 //! DESPOT: a plan for the present belief, searched for while time is left.
 //!
-//! K scenarios of the belief, each a state and a random number for every step to come, make the
-//! future a tree of actions and observations (Somani et al. 2013). Upper bounds of its leaves are
-//! fast informed, lower ones those of plans that are known: to do one thing for ever, or what a
-//! solver has found so far. A search improves both where they matter most for the best action.
+//! K scenarios of a belief, each a state with a weight, make the future a tree of actions and
+//! observations (Somani et al. 2013). Upper bounds of its leaves are fast informed, lower ones those
+//! of plans that are known: to do one thing for ever, or what a solver has found so far. A search
+//! improves both where they matter most for the best action.
 //!
-//! Two things differ from the paper. Every scenario counts after every observation, by its
-//! likelihood (Garg et al. 2019): fewer scenarios do, and none has to be followed by itself.
-//! A trial looks one step further at one leaf, the one with the widest gap that the most promising
-//! actions may lead to (Ross et al. 2008): so its cost is bounded.
+//! Two things differ from the paper. Scenarios are sampled only where a belief has more than K
+//! states, and every one counts after every observation, by its likelihood (Garg et al. 2019):
+//! rare events are not missed, and in small models the plan is exact. A trial looks one step further
+//! at one leaf, the one with the widest gap that the most promising actions may lead to (Ross et al.
+//! 2008): so its cost is bounded.
 //!
-//! A tree is dropped when the belief moves. What is planned depends on the belief that it began with,
-//! the seed and the number of trials; not on earlier beliefs, and not on a clock.
+//! A tree is dropped when the belief moves. What is planned depends on the belief that it began
+//! with, the seed and the number of trials; not on earlier beliefs, and not on a clock.
 
 mod generator;
 mod options;
@@ -24,7 +25,7 @@ use super::{Choice, PointBased, Policy, Votes, choose};
 use crate::bounds::mdp::Solution;
 use crate::model::Pomdp;
 use generator::Generator;
-use scenarios::Scenarios;
+use scenarios::Sampler;
 use tree::{Limits, Tree};
 
 /// A plan stands while the belief moves by no more than this, half the sum of absolute differences.
@@ -40,7 +41,7 @@ const STANDS: f64 = 1e-3;
 pub struct Despot {
     trials: usize,
     generator: Generator,
-    scenarios: Scenarios,
+    sampler: Sampler,
     tree: Tree,
     /// What the tree is for; nothing before the first decision.
     belief: Vec<f64>,
@@ -62,15 +63,10 @@ impl Despot {
         solved: Option<&PointBased>,
         options: &DespotOptions,
     ) -> Result<Self, DespotError> {
-        let DespotOptions {
-            scenarios,
-            depth,
-            nodes,
-            ..
-        } = *options;
         options.check()?;
+        let (nodes, depth) = (options.nodes, options.depth);
+        let scenarios = options.scenarios.min(model.states().len());
         let bytes = Tree::bytes(nodes, scenarios);
-        let bytes = bytes.saturating_add(size_of::<f64>() * scenarios * depth);
         if bytes > options::BYTES_MAX {
             return Err(DespotError::Memory {
                 nodes,
@@ -86,7 +82,7 @@ impl Despot {
         };
         Ok(Self {
             trials: options.trials,
-            scenarios: Scenarios::new(scenarios, depth, options.seed),
+            sampler: Sampler::new(scenarios, options.seed),
             tree: Tree::new(&generator, scenarios, limits),
             belief: vec![0.0; model.states().len()],
             is_planned: false,
@@ -99,7 +95,7 @@ impl Despot {
     /// Goes on with the search for the belief of the last decision. False once there is nothing to
     /// gain, or no room.
     pub fn search(&mut self, trials: usize) -> bool {
-        (0..trials).all(|_| self.tree.grow(&self.generator, &mut self.scenarios))
+        (0..trials).all(|_| self.tree.grow(&self.generator, &mut self.sampler))
     }
 
     /// Lower and upper bound of what the best plan earns in the scenarios; `None` before the first
@@ -122,15 +118,27 @@ impl Despot {
         if self.is_planned && 0.5 * moves.sum::<f64>() <= STANDS {
             return false;
         }
-        self.belief.fill(0.0);
-        for (ours, b) in self.belief.iter_mut().zip(belief) {
-            *ours = *b;
-        }
-        self.scenarios.draw(&self.belief);
-        self.tree.plant(&self.generator, &self.scenarios);
+        self.take(belief);
+        self.tree
+            .plant(&self.generator, &mut self.sampler, &self.belief);
         self.is_planned = true;
         self.search(self.trials);
         true
+    }
+
+    /// Entries that are no positive number count as 0; a belief of nothing else as uniform.
+    fn take(&mut self, belief: &[f64]) {
+        self.belief.fill(0.0);
+        for (ours, b) in self.belief.iter_mut().zip(belief) {
+            *ours = if b.is_finite() { b.max(0.0) } else { 0.0 };
+        }
+        let sum: f64 = self.belief.iter().sum();
+        if sum >= f64::MIN_POSITIVE && sum.is_finite() {
+            self.belief.iter_mut().for_each(|b| *b /= sum);
+        } else {
+            let count = self.belief.len() as f64;
+            self.belief.fill(1.0 / count);
+        }
     }
 }
 
@@ -144,9 +152,8 @@ impl Policy for Despot {
         // Plans without a search: no node, no cost.
         let actions = self.generator.actions;
         for (plan, action) in self.generator.plans().iter().enumerate() {
-            let states = self.scenarios.states().iter();
-            let weighted = states.zip(self.scenarios.weights());
-            let worth: f64 = weighted
+            let scenarios = self.tree.root_scenarios().iter();
+            let worth: f64 = scenarios
                 .map(|(state, weight)| weight * self.generator.bounds(*state)[actions + plan])
                 .sum();
             if let Some(value) = values.get_mut(*action as usize) {

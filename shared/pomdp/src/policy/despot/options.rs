@@ -11,8 +11,8 @@ pub(super) const BYTES_MAX: usize = 2 << 30;
 /// model of 1000 states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DespotOptions {
-    /// K, scenarios of a belief, 1 to 10000. More cost time in proportion; fewer plan for the luck
-    /// of a few.
+    /// K, scenarios of a belief, 1 to 10000. Where a belief has more states than that, more cost
+    /// time in proportion, and fewer plan for the luck of a few.
     pub scenarios: usize,
     /// Trials for a new belief, and in each share of spare time. Each looks one step further at one
     /// leaf.
@@ -84,18 +84,18 @@ impl DespotOptions {
     /// with what is `solved`.
     #[must_use]
     pub fn products(&self, model: &Pomdp, solved: Option<&PointBased>) -> usize {
-        let (actions, observations) = (model.actions().len(), model.observations().len());
-        let possible = |action: usize, next: usize| {
-            let seen = (0..observations).filter(|z| model.likelihood(action, *z)[next] > 0.0);
-            seen.count()
+        let (n, actions) = (model.states().len(), model.actions().len());
+        let pairs = || (0..actions).flat_map(|a| (0..n).map(move |s| (s, a)));
+        let possible = |(s, a): (usize, usize)| {
+            let all = 0..model.observations().len();
+            all.filter(|z| model.likelihood(a, *z)[s] > 0.0).count()
         };
-        let pairs = (0..actions).flat_map(|a| (0..model.states().len()).map(move |s| (a, s)));
-        let most = pairs.map(|(a, s)| possible(a, s)).fold(0, usize::max);
-        let plans = solved.map_or(0, |solved| solved.first_actions().len());
-        let of_scenario = actions * most * (2 * actions + plans);
+        let successors = pairs().map(|(s, a)| model.successors(s, a).len());
+        let moves = self.scenarios.min(n) * successors.fold(0, usize::max);
+        let observed = moves.min(n) * pairs().map(possible).fold(0, usize::max);
+        let plans = 2 * actions + solved.map_or(0, |solved| solved.first_actions().len());
         self.trials
-            .saturating_mul(self.scenarios)
-            .saturating_mul(of_scenario)
+            .saturating_mul(actions * (moves + observed * plans))
     }
 
     /// Refuses what no search can do.

@@ -4,7 +4,8 @@
 //! cost of every node of a plan (Ye et al. 2017, section 5). So bounds of children simply add up.
 
 use super::generator::{Generator, largest};
-use super::scenarios::Scenarios;
+use super::scenarios::{Sampler, Scenario};
+use crate::weights::Weights;
 
 /// No index.
 const NONE: u32 = u32::MAX;
@@ -58,6 +59,9 @@ struct Branch {
     node: u32,
     first_child: u32,
     children: u32,
+    /// The scenarios after the action, before the observation.
+    first_scenario: u32,
+    scenarios: u32,
     /// Less the cost of a node.
     reward: f64,
     bracket: Bracket,
@@ -78,10 +82,12 @@ pub(super) struct Tree {
     limits: Limits,
     nodes: Vec<Node>,
     branches: Vec<Branch>,
-    /// The states of all scenarios after each branch.
-    states: Vec<u32>,
-    /// Of each scenario, in the node that is looked at.
-    weights: Vec<f64>,
+    /// Those of the root, then those of every branch.
+    scenarios: Vec<Scenario>,
+    /// Of the node that is looked at.
+    present: Vec<Scenario>,
+    /// The belief after an action, all 0 between calls.
+    predicted: Weights,
     /// For each observation: the weighted sum of the bounds.
     sums: Vec<f64>,
     /// Observations of which `sums` holds something.
@@ -90,15 +96,16 @@ pub(super) struct Tree {
 }
 
 impl Tree {
-    /// Without a root.
+    /// Without a root; `scenarios` of each belief at most.
     pub(super) fn new(generator: &Generator, scenarios: usize, limits: Limits) -> Self {
         Self {
             limits,
             nodes: Vec::with_capacity(limits.nodes),
             // Every branch has a child.
             branches: Vec::with_capacity(limits.nodes),
-            states: Vec::with_capacity(limits.nodes * scenarios),
-            weights: vec![0.0; scenarios],
+            scenarios: Vec::with_capacity((limits.nodes + 1) * scenarios),
+            present: Vec::with_capacity(scenarios),
+            predicted: Weights::new(generator.states),
             sums: vec![0.0; generator.observations * generator.width()],
             met: Vec::with_capacity(generator.observations),
             is_met: vec![false; generator.observations],
@@ -107,19 +114,26 @@ impl Tree {
 
     /// Memory of a tree, bytes.
     pub(super) const fn bytes(nodes: usize, scenarios: usize) -> usize {
-        let of_states = size_of::<u32>().saturating_mul(scenarios);
-        nodes.saturating_mul(size_of::<Node>() + size_of::<Branch>() + of_states)
+        let of_scenarios = size_of::<Scenario>().saturating_mul(scenarios);
+        let of_node = size_of::<Node>() + size_of::<Branch>();
+        nodes
+            .saturating_add(1)
+            .saturating_mul(of_scenarios.saturating_add(of_node))
     }
 
-    /// Begins anew with a root for scenarios that have just been drawn.
-    pub(super) fn plant(&mut self, generator: &Generator, scenarios: &Scenarios) {
+    /// Begins anew with a root of this belief.
+    pub(super) fn plant(&mut self, generator: &Generator, sampler: &mut Sampler, belief: &[f64]) {
         self.nodes.clear();
         self.branches.clear();
-        self.states.clear();
+        self.scenarios.clear();
+        self.predicted.set(belief.iter().copied());
+        sampler.begin(&self.predicted);
+        sampler.draw(&self.predicted, &mut self.scenarios);
+        self.predicted.clear();
         let sums = &mut self.sums[..generator.width()];
         sums.fill(0.0);
-        for (&state, weight) in scenarios.states().iter().zip(scenarios.weights()) {
-            add_scaled(sums, generator.bounds(state), *weight);
+        for (state, weight) in &self.scenarios {
+            add_scaled(sums, generator.bounds(*state), *weight);
         }
         let root = Node {
             branch: NONE,
@@ -131,6 +145,15 @@ impl Tree {
             widest: 0.0,
         };
         self.nodes.push(leaf(root, sums, generator, &self.limits));
+    }
+
+    /// Scenarios of the root.
+    pub(super) fn root_scenarios(&self) -> &[Scenario] {
+        let end = self
+            .branches
+            .first()
+            .map(|branch| branch.first_scenario as usize);
+        &self.scenarios[..end.unwrap_or(self.scenarios.len())]
     }
 
     /// Bounds of the root.
@@ -148,28 +171,37 @@ impl Tree {
     /// A trial: looks one step further at the leaf with the widest gap of all that the most
     /// promising actions may lead to (Ross et al. 2008, section 3.4). False if no such leaf is
     /// left, or no room.
-    pub(super) fn grow(&mut self, generator: &Generator, scenarios: &mut Scenarios) -> bool {
+    pub(super) fn grow(&mut self, generator: &Generator, sampler: &mut Sampler) -> bool {
         let room = generator.actions * generator.observations;
         let is_full = self.nodes.len().saturating_add(room) > self.limits.nodes;
         if is_full || self.nodes.first().is_none_or(|root| root.widest <= 0.0) {
             return false;
         }
-        self.weights.copy_from_slice(scenarios.weights());
         let mut at = 0;
         while self.nodes[at].first_branch != NONE {
             let Some(child) = self.most_uncertain(at, generator.actions) else {
                 return false;
             };
             at = child;
-            self.weigh(at, generator);
         }
-        if !scenarios.prepare(self.nodes[at].depth as usize) {
-            return false;
-        }
+        self.gather(at, generator);
         self.nodes[at].first_branch = self.branches.len() as u32;
         for action in 0..generator.actions {
-            self.simulate(at, action, generator, scenarios);
-            self.observe(at, action, generator, scenarios);
+            let reward = self.predict(action, generator);
+            let first_scenario = self.scenarios.len();
+            sampler.draw(&self.predicted, &mut self.scenarios);
+            self.branches.push(Branch {
+                node: at as u32,
+                first_child: self.nodes.len() as u32,
+                children: 0,
+                first_scenario: first_scenario as u32,
+                scenarios: (self.scenarios.len() - first_scenario) as u32,
+                reward: generator.discount.powi(self.nodes[at].depth as i32) * reward
+                    - self.limits.cost,
+                bracket: Bracket::point(0.0),
+            });
+            self.observe(at, action, generator);
+            self.predicted.clear();
         }
         self.back_up(at, generator.actions);
         true
@@ -190,54 +222,44 @@ impl Tree {
         widest.filter(|child| self.nodes[*child].widest > 0.0)
     }
 
-    /// The weights of a node, from those of its parent.
-    fn weigh(&mut self, at: usize, generator: &Generator) {
-        let Node {
-            branch,
-            observation,
-            ..
-        } = self.nodes[at];
-        let parent = self.branches[branch as usize].node as usize;
-        let action = branch as usize - self.nodes[parent].first_branch as usize;
-        let count = self.weights.len();
-        let states = &self.states[branch as usize * count..][..count];
-        for (weight, &next) in self.weights.iter_mut().zip(states) {
-            if *weight > 0.0 {
-                *weight *= generator.likelihood(next, action, observation);
-            }
+    /// The scenarios of a node: those after the action that leads to it, weighed by the likelihood
+    /// of the observation that does (Garg et al. 2019).
+    fn gather(&mut self, at: usize, generator: &Generator) {
+        let node = self.nodes[at];
+        self.present.clear();
+        if node.branch == NONE {
+            let root = self.root_scenarios().len();
+            return self.present.extend_from_slice(&self.scenarios[..root]);
         }
+        let branch = self.branches[node.branch as usize];
+        let parent = self.nodes[branch.node as usize];
+        let action = (node.branch - parent.first_branch) as usize;
+        let after = &self.scenarios[branch.first_scenario as usize..][..branch.scenarios as usize];
+        let weighed = after.iter().map(|&(state, weight)| {
+            let likelihood = generator.likelihood(state, action, node.observation);
+            (state, weight * likelihood)
+        });
+        self.present
+            .extend(weighed.filter(|(_, weight)| *weight > 0.0));
     }
 
-    /// The state of a scenario in a node.
-    fn state(&self, at: usize, scenario: usize, scenarios: &Scenarios) -> u32 {
-        match self.nodes[at].branch {
-            NONE => scenarios.states()[scenario],
-            branch => self.states[branch as usize * self.weights.len() + scenario],
-        }
-    }
-
-    /// Writes the states of the scenarios after one action more.
-    fn simulate(&mut self, at: usize, action: usize, generator: &Generator, with: &Scenarios) {
-        let depth = self.nodes[at].depth as usize;
-        for (scenario, &chance) in with.chances(depth).iter().enumerate() {
-            let state = self.state(at, scenario, with);
-            self.states.push(generator.successor(state, action, chance));
-        }
-    }
-
-    /// Adds the branch whose states have just been written, with a child for each observation.
-    /// Every scenario counts in each of them, by the observation's likelihood (Garg et al. 2019).
-    fn observe(&mut self, at: usize, action: usize, generator: &Generator, with: &Scenarios) {
-        let (count, width) = (self.weights.len(), generator.width());
-        let first = self.states.len() - count;
+    /// The belief after an action in the node that is looked at, and the expected reward.
+    fn predict(&mut self, action: usize, generator: &Generator) -> f64 {
         let mut reward = 0.0;
-        for scenario in 0..count {
-            let weight = self.weights[scenario];
-            if weight <= 0.0 {
-                continue;
+        for &(state, weight) in &self.present {
+            reward += weight * generator.reward(state, action);
+            for &(next, p) in generator.successors(state, action) {
+                self.predicted.add(next, weight * p);
             }
-            reward += weight * generator.reward(self.state(at, scenario, with), action);
-            let next = self.states[first + scenario];
+        }
+        reward
+    }
+
+    /// Gives the newest branch a child for each observation, with bounds by all that is predicted.
+    fn observe(&mut self, at: usize, action: usize, generator: &Generator) {
+        let width = generator.width();
+        for &next in self.predicted.support() {
+            let weight = self.predicted.at(next);
             for &(z, p) in generator.observed(next, action) {
                 let sums = &mut self.sums[z as usize * width..][..width];
                 if !std::mem::replace(&mut self.is_met[z as usize], true) {
@@ -247,31 +269,24 @@ impl Tree {
                 add_scaled(sums, generator.bounds(next), weight * p);
             }
         }
-        let depth = self.nodes[at].depth;
-        let reward = generator.discount.powi(depth as i32) * reward - self.limits.cost;
-        let (branch, first_child) = (self.branches.len() as u32, self.nodes.len() as u32);
+        let index = self.branches.len() - 1;
         for &observation in &self.met {
             self.is_met[observation as usize] = false;
             let child = Node {
-                branch,
+                branch: index as u32,
                 observation,
                 first_branch: NONE,
-                depth: depth + 1,
+                depth: self.nodes[at].depth + 1,
                 ..self.nodes[at]
             };
             let sums = &self.sums[observation as usize * width..][..width];
             self.nodes.push(leaf(child, sums, generator, &self.limits));
         }
+        let mut branch = self.branches[index];
+        branch.children = self.met.len() as u32;
         self.met.clear();
-        let mut branch = Branch {
-            node: at as u32,
-            first_child,
-            children: self.nodes.len() as u32 - first_child,
-            reward,
-            bracket: Bracket::point(reward),
-        };
         self.add_children(&mut branch);
-        self.branches.push(branch);
+        self.branches[index] = branch;
     }
 
     fn add_children(&self, branch: &mut Branch) {
