@@ -133,7 +133,8 @@ impl SymptomDecision {
         }
     }
 
-    /// Takes over what is known of the hardware; true if that moves the belief by more than `least`.
+    /// Takes over what is known of the hardware; true if that moves the belief by more than
+    /// `least`.
     fn take_over(&mut self, least: f64) -> bool {
         let Some(hardware) = &self.hardware else {
             return false;

@@ -1,14 +1,14 @@
 //! DESPOT: a plan for the present belief, searched for while time is left.
 //!
 //! K scenarios of a belief, each a state with a weight, make the future a tree of actions and
-//! observations (Somani et al. 2013). Upper bounds of its leaves are fast informed, lower ones those
-//! of plans that are known: to do one thing for ever, or what a solver has found so far. A search
-//! improves both where they matter most for the best action.
+//! observations (Somani et al. 2013). Upper bounds of its leaves are fast informed. Lower ones are
+//! those of plans that are known: to do one thing for ever, or what a solver has found so far. A
+//! search improves both where they matter most for the best action.
 //!
 //! Two things differ from the paper. Scenarios are sampled only where a belief has more than K
-//! states, and every one counts after every observation, by its likelihood (Garg et al. 2019):
-//! rare events are not missed, and in small models the plan is exact. A trial looks one step further
-//! at one leaf, the one with the widest gap that the most promising actions may lead to (Ross et al.
+//! states. Every one counts after every observation, by its likelihood (Garg et al. 2019): rare
+//! events are not missed, and in small models the plan is exact. A trial looks one step further at
+//! one leaf, the one with the widest gap that the most promising actions may lead to (Ross et al.
 //! 2008): so its cost is bounded.
 //!
 //! A tree is dropped when the belief moves. What is planned depends on the belief that it began

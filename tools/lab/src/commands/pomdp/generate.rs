@@ -12,8 +12,8 @@ use super::save;
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
-/// Writes the model that follows from a file of parameters: of exceptions of navigation and hardware
-/// (`model = "exceptions"`), of the paper's navigation, or of what to do about faults.
+/// Writes the model that follows from a file of parameters: of exceptions of navigation and
+/// hardware (`model = "exceptions"`), of the paper's navigation, or of what to do about faults.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Parameters, such as config/corridor.recovery.toml or config/rover.recovery.toml.
