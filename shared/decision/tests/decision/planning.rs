@@ -91,7 +91,7 @@ fn planning_allocates_nothing_and_a_replay_gives_equal_bits() {
     assert!(allocations() > 0, "the allocator does not count");
     // As much as a cycle has time for with a model of that many states.
     let little = |settings: &mut Settings| {
-        (settings.despot.trials, settings.despot.scenarios) = (1, 16);
+        (settings.despot.trials, settings.despot.scenarios) = (1, 4);
     };
     let setup = load("corridor-obstacle.toml", little).unwrap();
     let live = exceptions(&mut assemble(&setup).unwrap());
