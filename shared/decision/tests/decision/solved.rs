@@ -16,6 +16,7 @@ use vigil_setup::graph_file::GraphFile;
 use vigil_setup::{Setup, load_graph};
 use vigil_supervisor::assemble;
 
+use crate::navigation::by_the_papers_model;
 use crate::world::{CYCLE_NS, config};
 
 fn model(name: &str) -> Pomdp {
@@ -56,19 +57,12 @@ fn file(model: &Pomdp, lower: f64, vectors: AlphaVectors) -> Vec<u8> {
     file.write(model).unwrap()
 }
 
-/// Actions of the shipped corridors that the paper's model does not have.
-const NOT_THE_PAPERS: [&str; 3] = ["SL", "CP", "IG"];
-
 /// A shipped graph that decides by the policy in `path`; every problem, if it is refused.
 fn load(graph: &str, path: &Path) -> Result<Setup, String> {
     let change = |file: &mut GraphFile| {
         if file.navigation.is_some() {
-            // The paper's model is small enough to be solved here.
-            file.files.decision = "navigation.pomdp".to_owned();
-            file.supervisor
-                .actions
-                .retain(|name, _| !NOT_THE_PAPERS.contains(&name.as_str()));
-            file.supervisor.lost_state = None;
+            // It is small enough to be solved here.
+            by_the_papers_model(file);
         }
         file.supervisor.policy = "point-based".to_owned();
         file.supervisor.policy_file = Some(path.to_str().unwrap().to_owned());

@@ -16,13 +16,19 @@ const GRAPH: &str = include_str!("../../../../../config/corridor-obstacle.toml")
 
 /// Q-MDP about the paper's model.
 pub fn settings() -> Settings {
-    let mut settings = joint_settings();
-    settings.lost_state = None;
+    let mut file = toml::from_str(GRAPH).unwrap();
+    by_the_papers_model(&mut file);
+    file.supervisor
+}
+
+/// Has a corridor decide by the paper's model, which has fewer states and actions.
+pub fn by_the_papers_model(file: &mut GraphFile) {
     let paper = ["FP", "NP", "RL", "GO", "MA", "SH", "GU"];
-    settings
+    file.files.decision = "navigation.pomdp".to_owned();
+    file.supervisor
         .actions
         .retain(|name, _| paper.contains(&name.as_str()));
-    settings
+    file.supervisor.lost_state = None;
 }
 
 /// As shipped, but by Q-MDP.
