@@ -6,9 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::SolveError;
-#[cfg(feature = "solver")]
-use super::{rounding, slacks};
+use super::{SolveError, rounding, slacks};
 use crate::budget::Budget;
 
 /// Up to this size the LU decomposition is taken at once. It decides the time alone: 48 rows take
@@ -60,7 +58,6 @@ impl Rows {
     }
 
     /// True if a row has no entry.
-    #[cfg(feature = "solver")]
     pub(crate) fn is_empty(&self, row: usize) -> bool {
         self.row(row).is_empty()
     }
@@ -128,7 +125,6 @@ impl System<'_> {
     ///
     /// # Errors
     /// [`SolveError`]; `Unbounded` if there is none, as where some rows never come to an end.
-    #[cfg(feature = "solver")]
     pub(crate) fn solve_beside(
         &self,
         outward: f64,

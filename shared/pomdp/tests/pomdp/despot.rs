@@ -207,6 +207,26 @@ fn a_tree_without_room_decides_by_the_plans_that_are_known() {
 }
 
 #[test]
+fn without_a_discount_a_goal_ends_what_is_planned() {
+    let model = parse(
+        "discount: 1\nvalues: cost\nstates: away home\nactions: walk fly\nobservations: 1\n\
+         start: away\nT: walk\n0.5 0.5\n0 1\nT: fly\n0 1\n0 1\nO: * uniform\n\
+         R: walk : away : * : * 1\nR: fly : away : * : * 3\n",
+    );
+    // To walk takes two steps on average.
+    let mut policy = planner(&model, &options(2, 200));
+    let mut values = [0.0; 2];
+    let choice = policy.evaluate(&[1.0, 0.0], &mut values);
+    assert_eq!(choice.action, 0);
+    let (lower, upper) = policy.bounds().unwrap();
+    assert!(
+        (-2.001..=-1.999).contains(&lower) && upper >= lower,
+        "{lower} {upper}"
+    );
+    assert!((values[1] + 3.0).abs() < 1e-9, "{values:?}");
+}
+
+#[test]
 fn a_plan_that_costs_more_than_it_gains_is_not_followed() {
     let model = parse(TIGER);
     let dear = DespotOptions {

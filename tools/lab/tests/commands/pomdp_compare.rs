@@ -272,7 +272,7 @@ fn options_that_mean_nothing_are_refused_with_what_is_allowed() {
         ),
         (
             &["--policy-file", "config/rover.toml"],
-            "--policy-file: has a meaning only with the policy point-based",
+            "--policy-file: has a meaning only with the policies point-based and despot",
         ),
         (
             &["--policies", "point-based", "--policy-file", "config/none"],
