@@ -15,7 +15,7 @@ pub struct DespotSettings {
     pub scenarios: u32,
     /// Trials of a decision about a new belief, and of each cycle in which the belief stands. Each
     /// looks one step further. Too many for a cycle are refused.
-    #[default(5)]
+    #[default(4)]
     #[schemars(range(min = 1, max = 1000))]
     pub trials: u32,
     /// Nodes of the tree of a belief: once they are used up, its plan stands.

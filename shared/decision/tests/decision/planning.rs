@@ -108,7 +108,7 @@ fn searches_that_no_cycle_has_time_for_are_refused_with_line_key_and_reason() {
     let part = "supervisor.despot.trials: 1000 trials with 64 scenarios take";
     assert!(message.contains(part), "{message}");
     assert!(
-        message.contains("allowed are 200000: choose fewer of either"),
+        message.contains("allowed are 2000000: choose fewer of either"),
         "{message}"
     );
     let message = load("rover.toml", |settings| settings.despot.scenarios = 0)

@@ -76,9 +76,9 @@ pub enum DespotError {
 }
 
 impl DespotOptions {
-    /// Multiplications of the trials of a decision beyond which a cycle has no time for it; some
-    /// 0.1 ms.
-    pub const PRODUCTS_MAX: usize = 200_000;
+    /// Multiplications of the trials of a decision beyond which a cycle has no time for it: some
+    /// 0.1 ms where most states allow few observations, 1 ms where all allow all.
+    pub const PRODUCTS_MAX: usize = 2_000_000;
 
     /// Multiplications of the trials of a decision about `model`, at most, where a search may end
     /// with what is `solved`.
