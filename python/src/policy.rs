@@ -76,7 +76,8 @@ impl Policy {
         Ok((action, decider.values().to_vec()))
     }
 
-    fn solved_or_refusal(&self) -> PyResult<&Solved> {
+    /// What was solved.
+    pub fn solved_or_refusal(&self) -> PyResult<&Solved> {
         let missing = || refusal(format!("{} follows from the model: no vectors", self.name));
         self.solved.as_ref().ok_or_else(missing)
     }
@@ -154,7 +155,7 @@ impl Policy {
     }
 
     /// The action for a belief: a Tracker, or one probability a state. Ties within 1e-9 go to the
-    /// action with the lowest index.
+    /// action that most of the belief votes for, then to the lowest index.
     fn action(&self, py: Python<'_>, belief: Belief<'_>) -> PyResult<String> {
         let (action, _) = self.decide(py, belief)?;
         Ok(self.model.pomdp.actions()[action].clone())

@@ -1,8 +1,10 @@
 //! What a policy earns in simulated missions.
 
+use std::ops::ControlFlow;
+
 use pyo3::prelude::*;
-use vigil_missions::simulation::{Episode, Summary, World, horizon};
-use vigil_pomdp::{Decider, Pomdp, Tracker};
+use vigil_missions::simulation::{Episode, PolicyAgent, Rules, Summary, run_watched};
+use vigil_pomdp::Pomdp;
 
 use crate::errors::refusal;
 use crate::model::Model;
@@ -16,8 +18,8 @@ const STEPS_MAX: usize = 1_000_000;
 /// width of its 95 % interval.
 ///
 /// The world follows `model`; the policy believes in its own, which may be another one with the
-/// same names. A run ends after `steps` (None: once the discount is below 1e-4, but after 1000000
-/// at most). Equal seeds give equal random numbers, whichever the policy.
+/// same names. A run ends at a goal, or after `steps` (None: once the discount is below 1e-4, but
+/// after 1000000 at most). Equal seeds give equal random numbers, whichever the policy.
 ///
 /// Raises PomdpError; KeyboardInterrupt on Ctrl-C.
 #[pyfunction]
@@ -45,55 +47,28 @@ pub fn simulate(
             "runs is {runs}, allowed is a number from 2"
         )));
     }
-    let steps = steps.unwrap_or_else(|| horizon(world.discount(), STEPS_MAX));
+    let mut rules = Rules::endless(world, STEPS_MAX);
+    rules.steps_max = steps.unwrap_or(rules.steps_max);
     let mut end = End::after(None)?;
     let mut earned = py.detach(|| {
         policy.with_decider(|decider| {
-            let mut mission = Mission {
-                world,
-                believed,
-                decider,
-                tracker: Tracker::new(believed),
-                steps,
+            let mut agent = PolicyAgent::new(believed, decider);
+            let mut earn = |number| {
+                let mut has_ended = false;
+                let episode = Episode { seed, number };
+                let mission = run_watched(world, &mut agent, &rules, episode, &mut |_| {
+                    has_ended = end.has_come();
+                    match has_ended {
+                        true => ControlFlow::Break(()),
+                        false => ControlFlow::Continue(()),
+                    }
+                });
+                (!has_ended).then_some(mission.discounted)
             };
-            let numbers = 0..runs;
-            let earned =
-                numbers.map_while(|number| mission.run(Episode { seed, number }, &mut end));
-            earned.collect::<Vec<f64>>()
+            (0..runs).map_while(&mut earn).collect::<Vec<f64>>()
         })
     });
     end.finish()?;
     let summary = Summary::new(&mut earned);
     Ok((summary.mean, summary.half_width))
-}
-
-/// A world, and who acts in it.
-struct Mission<'a> {
-    world: &'a Pomdp,
-    believed: &'a Pomdp,
-    decider: &'a mut Decider,
-    tracker: Tracker,
-    steps: usize,
-}
-
-impl Mission<'_> {
-    /// The discounted reward of one run; none if the end has come.
-    fn run(&mut self, episode: Episode, end: &mut End) -> Option<f64> {
-        let mut world = World::new(self.world, episode);
-        self.tracker.reset();
-        self.decider.reset();
-        let (mut sum, mut weight) = (0.0, 1.0);
-        for _ in 0..self.steps {
-            if end.has_come() {
-                return None;
-            }
-            let action = self.decider.decide(self.tracker.belief()).action;
-            let event = world.step(action);
-            sum += weight * event.reward;
-            weight *= self.world.discount();
-            self.tracker
-                .update(self.believed, action, event.observation);
-        }
-        Some(sum)
-    }
 }

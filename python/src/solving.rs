@@ -11,8 +11,6 @@ use crate::policy::{Policy, Solved};
 use crate::signals::End;
 
 const BYTES_PER_GIB: f64 = (1_u64 << 30) as f64;
-/// Standard errors by which what a small policy loses is thought to be more than in the sample.
-const LOSS_ERRORS: f64 = 4.0;
 
 /// Processor time of this thread, s.
 fn thread_s(py: Python<'_>) -> PyResult<f64> {
@@ -34,8 +32,8 @@ fn check(name: &str, value: f64) -> PyResult<()> {
 /// `timeout_s` seconds (None: never), or when its tables fill `memory_gib` GiB. The same model and
 /// precision give the same policy, unless time or memory ended the search.
 ///
-/// Raises PomdpError for a model of unbounded value, such as one with discount 1, and if time ended
-/// before there was a policy; KeyboardInterrupt on Ctrl-C.
+/// Raises PomdpError for a model of unbounded value, such as one with discount 1 and no goal, and
+/// if time ended before there was a policy; KeyboardInterrupt on Ctrl-C.
 #[pyfunction]
 #[pyo3(signature = (model, *, precision=1e-3, timeout_s=60.0, memory_gib=3.0))]
 pub fn solve(
@@ -140,13 +138,7 @@ pub fn heuristic(py: Python<'_>, model: Model, name: &str, threshold: f64) -> Py
 #[pyfunction]
 pub fn compact(py: Python<'_>, policy: &Bound<'_, Policy>, vectors_max: usize) -> PyResult<Policy> {
     let policy = policy.get();
-    let missing = || {
-        refusal(format!(
-            "{} follows from the model: no vectors",
-            policy.name
-        ))
-    };
-    let solved = policy.solved.as_ref().ok_or_else(missing)?;
+    let solved = policy.solved_or_refusal()?;
     if vectors_max == 0 {
         return Err(refusal("vectors_max is 0, allowed is a number from 1"));
     }
@@ -158,7 +150,7 @@ pub fn compact(py: Python<'_>, policy: &Bound<'_, Policy>, vectors_max: usize) -
     });
     end.finish()?;
     let small = small.map_err(refusal)?;
-    let loss = small.loss_mean + LOSS_ERRORS * small.loss_error;
+    let loss = small.loss_max();
     let solved = Solved {
         vectors: small.vectors,
         lower: solved.lower.map(|lower| lower - loss),

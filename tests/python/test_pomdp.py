@@ -133,7 +133,7 @@ class Models(unittest.TestCase):
             (lambda: vp.heuristic(model, "luck"), "policy 'luck' is not known: allowed are mls"),
             (lambda: vp.heuristic(model, "dm-mls", threshold=2), "threshold 2: allowed is 0 to 1"),
             (lambda: vp.bound(model, "luck"), "'luck', allowed are mdp, blind"),
-            (lambda: vp.solve(endless), "not bounded with discount 1"),
+            (lambda: vp.solve(endless), "discount 1 needs a goal"),
             (lambda: vp.solve(model, precision=-1), "precision is -1, allowed is a number from 0"),
             (lambda: vp.solve(model, timeout_s=float("nan")), "timeout_s is NaN"),
             (lambda: vp.value(vp.heuristic(model, "dm-mls")), "dm-mls remembers"),
@@ -246,6 +246,15 @@ class LongCalls(unittest.TestCase):
         model = tiger()
         policy = vp.heuristic(model, "qmdp")
         self.interrupted(lambda: vp.simulate(model, policy, runs=10**9, steps=10**9))
+
+    def test_a_run_ends_at_a_goal(self):
+        model = vp.Model.parse(
+            "discount: 1 values: reward states: open done actions: look observations: 1 "
+            "start: 1 0 T: look 0.5 0.5 0 1 O: look 1 1 R: look : open : * : * -1"
+        )
+        # Two looks on average; without an end it would not come back.
+        mean, half_width = vp.simulate(model, vp.heuristic(model, "qmdp"), runs=2000, steps=10**12)
+        self.assertLess(abs(mean + 2.0), 2.0 * half_width)
 
     def test_a_policy_serves_several_threads(self):
         model = tiger()

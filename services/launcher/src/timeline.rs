@@ -247,17 +247,12 @@ fn blind_s<'a>(
     sums
 }
 
-fn own_symptoms(setup: &Setup) -> Vec<(String, u32)> {
-    let own = setup.file.supervisor.symptoms.iter();
-    own.map(|(name, own)| (name.clone(), own.bit)).collect()
-}
-
 /// Gives names to what events are about.
 struct Namer {
     nodes: Vec<String>,
     states: Vec<String>,
     actions: Vec<String>,
-    /// The user's own, with their bits.
+    /// The user's own, each with the set that holds it alone.
     symptoms: Vec<(String, u32)>,
     robot: vigil_robot::Description,
 }
@@ -266,11 +261,14 @@ impl Namer {
     /// Names from a graph's models.
     fn new(setup: &Setup) -> Self {
         let nodes = setup.tree.nodes().iter();
+        let symptoms = setup.file.supervisor.symptoms.iter();
         Self {
             nodes: nodes.map(|node| node.name.clone()).collect(),
             states: setup.decision.states().to_vec(),
             actions: setup.decision.actions().to_vec(),
-            symptoms: own_symptoms(setup),
+            symptoms: symptoms
+                .map(|(name, own)| (name.clone(), own.set()))
+                .collect(),
             robot: setup.robot.clone(),
         }
     }

@@ -4,9 +4,9 @@ use vigil_blocks::{ActionOutcome, Blindness, Degraded, Event, RecoveryKind, Size
 use vigil_cycle::watchdog::WatchdogFinding;
 
 /// Symptoms, joined by `_` as in the decision model; `none` for the empty set. `own` are those that
-/// the graph declares, with their bits.
+/// the graph declares, each with the set that holds it alone.
 pub fn symptoms(set: u32, own: &[(String, u32)]) -> String {
-    let own = own.iter().map(|(name, bit)| (name.as_str(), 1 << bit));
+    let own = own.iter().map(|(name, bit)| (name.as_str(), *bit));
     let named = Symptoms::NAMED.into_iter().chain(own);
     let present = named.filter(|(_, bit)| set & bit != 0);
     let present: Vec<&str> = present.map(|(name, _)| name).collect();
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn sets_of_symptoms_and_reasons_are_joined_and_empty_ones_have_a_word() {
-        let own = [("DOOR".to_owned(), 9)];
+        let own = [("DOOR".to_owned(), 1 << 9)];
         assert_eq!(symptoms(0, &own), "none");
         assert_eq!(symptoms(Symptoms::EPS | Symptoms::LD, &own), "EPS_LD");
         assert_eq!(symptoms(1 << 9 | Symptoms::LD, &own), "LD_DOOR");

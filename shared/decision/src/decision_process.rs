@@ -10,11 +10,12 @@ use vigil_pomdp::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker
 use crate::alarm_fusion::Situation;
 use crate::error::SupervisorError;
 use crate::inputs::Inputs;
-use crate::latch::stands;
+use crate::latch::{Latch, stands};
 use crate::mapping::{self, ActionMeaning};
 use crate::policy;
 use crate::settings::Settings;
 use crate::stage_loss::StageLossMonitor;
+use crate::wheels::Wheels;
 
 /// A published belief sums to 1 within this: the tracker's tolerance.
 const SUM_TOLERANCE: f64 = 1e-9;
@@ -134,9 +135,30 @@ impl DecisionProcess {
             .map_or(RecoveryKind::Stop, |m| m.kind)
     }
 
+    /// Takes over the policy's choice, unless another action is latched, and the wheel that it is
+    /// about.
+    pub(crate) fn choose(&mut self, best: Choice, latch: &mut Latch, wheels: &mut Wheels) {
+        let choice = latch.choose(best, |action| self.kind(action));
+        let before = std::mem::replace(&mut self.choice, choice).action;
+        wheels.choose(self.kind(choice.action), choice.action == before);
+    }
+
+    /// What the present choice makes the robot do; in the safe mode it stops.
+    pub(crate) fn instruction(&self, wheels: &Wheels) -> Instruction {
+        if self.control_mode == ControlMode::Safe {
+            return self.safe_stop();
+        }
+        let action = self.choice.action;
+        Instruction {
+            action,
+            kind: self.kind(action),
+            wheel: wheels.about(),
+        }
+    }
+
     /// The stop of a safe mode: the model's action of that kind, if it has one, else the present
     /// action's index.
-    pub(crate) fn safe_stop(&self) -> Instruction {
+    fn safe_stop(&self) -> Instruction {
         let is_stop = |m: &ActionMeaning| m.kind == RecoveryKind::Stop;
         let stop = self.actions.iter().position(is_stop);
         Instruction {

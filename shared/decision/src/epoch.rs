@@ -36,7 +36,7 @@ impl SymptomKinds {
     pub(crate) fn new(own: &BTreeMap<String, OwnSymptom>) -> Self {
         let of = |counts| {
             let bits = own.values().filter(|own| own.counts == counts);
-            bits.fold(0, |set, own| set | 1 << own.bit)
+            bits.fold(0, |set, own| set | own.set())
         };
         let standing = POSITION | of(Counts::Standing);
         Self {

@@ -1,6 +1,6 @@
 //! Decisions about the leaves of the fault tree: the identifier's belief is the evidence.
 
-use vigil_blocks::{Action, ControlMode, DetectionBelief, FaultBelief, RecoveryKind};
+use vigil_blocks::{Action, ControlMode, DetectionBelief, FaultBelief};
 use vigil_pomdp::policy::Measure;
 use vigil_pomdp::{Choice, Control};
 use vigil_robot::{Description, FaultTree};
@@ -184,25 +184,7 @@ impl FaultDecision {
     }
 
     fn choose(&mut self, best: Choice) {
-        let process = &mut self.process;
-        let actions = &process.actions;
-        let kind = |action: usize| actions.get(action).map_or(RecoveryKind::Stop, |m| m.kind);
-        let before = std::mem::replace(&mut process.choice, self.latch.choose(best, kind)).action;
-        let action = process.choice.action;
-        self.wheels.choose(process.kind(action), action == before);
-    }
-
-    fn instruction(&self) -> Instruction {
-        if self.process.control_mode == ControlMode::Safe {
-            return self.process.safe_stop();
-        }
-        let action = self.process.choice.action;
-        let kind = self.process.kind(action);
-        Instruction {
-            action,
-            kind,
-            wheel: self.wheels.about(),
-        }
+        self.process.choose(best, &mut self.latch, &mut self.wheels);
     }
 }
 
@@ -273,7 +255,7 @@ impl DecisionRule for FaultDecision {
     }
 
     fn write(&mut self, action: &mut Action) {
-        let instruction = self.instruction();
+        let instruction = self.process.instruction(&self.wheels);
         if self.instruction != Some(instruction) {
             self.instruction = Some(instruction);
             self.process.decision_seq += 1;

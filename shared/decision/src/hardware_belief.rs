@@ -8,6 +8,7 @@ use crate::alarm_fusion::Situation;
 use crate::error::SupervisorError;
 use crate::joint_states::JointStates;
 use crate::state_belief::{self, normalise, write_fallback, write_weights};
+use crate::states::StateMeaning;
 
 /// Probabilities of the hardware's states, as the identifier holds them.
 pub(crate) struct HardwareBelief {
@@ -42,18 +43,12 @@ impl HardwareBelief {
         state_belief::is_sound(diagnosis, &self.states.hardware, self.tree_hash)
     }
 
-    /// Takes a sound diagnosis; `belief` is the predicted one over the model's states. A robot that
-    /// rests looks healthy: of that it is not believed.
+    /// Takes a sound diagnosis; `belief` is the predicted one over the model's states.
     pub(crate) fn take(&mut self, diagnosis: &FaultBelief, situation: Situation, belief: &[f64]) {
-        let mut predicted = [0.0; DECISION_STATES];
-        let count = self.states.hardware.len();
-        let predicted = &mut predicted[..count];
-        self.states.write_hardware(belief, predicted);
-        let p = &mut self.p[..count];
-        let hardware = &self.states.hardware;
-        write_weights(diagnosis, hardware, situation.alarm, predicted, p);
-        normalise(p);
-        self.is_known = !situation.rests || p[0] < predicted[0];
+        self.take_by(situation.rests, belief, |states, predicted, p| {
+            write_weights(diagnosis, states, situation.alarm, predicted, p);
+            normalise(p);
+        });
     }
 
     /// Takes what the detector says in the identifier's place.
@@ -63,19 +58,26 @@ impl HardwareBelief {
         situation: Situation,
         belief: &[f64],
     ) {
-        let mut predicted = [0.0; DECISION_STATES];
+        self.take_by(situation.rests, belief, |states, predicted, p| {
+            write_fallback(detection, states, situation.alarm, predicted, p);
+        });
+    }
+
+    /// Takes what `write` makes of the predicted hardware. A robot that rests looks healthy: of
+    /// that it is not believed.
+    fn take_by(
+        &mut self,
+        rests: bool,
+        belief: &[f64],
+        write: impl FnOnce(&[StateMeaning], &[f64], &mut [f64]),
+    ) {
         let count = self.states.hardware.len();
+        let mut predicted = [0.0; DECISION_STATES];
         let predicted = &mut predicted[..count];
         self.states.write_hardware(belief, predicted);
         let p = &mut self.p[..count];
-        write_fallback(
-            detection,
-            &self.states.hardware,
-            situation.alarm,
-            predicted,
-            p,
-        );
-        self.is_known = !situation.rests || p[0] < predicted[0];
+        write(&self.states.hardware, predicted, p);
+        self.is_known = !rests || p[0] < predicted[0];
     }
 
     /// Writes `belief` with what is known of the hardware; as it is, if nothing is.

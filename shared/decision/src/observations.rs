@@ -29,7 +29,7 @@ impl Observations {
         model: &Pomdp,
         own: &BTreeMap<String, OwnSymptom>,
     ) -> Result<Self, SupervisorError> {
-        let own = own.iter().map(|(name, of)| (name.as_str(), 1 << of.bit));
+        let own = own.iter().map(|(name, of)| (name.as_str(), of.set()));
         let named: Vec<(&str, u32)> = Symptoms::NAMED.into_iter().chain(own).collect();
         let mut sets: Vec<(u32, usize)> = Vec::new();
         for (z, name) in model.observations().iter().enumerate() {

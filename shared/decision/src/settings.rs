@@ -96,6 +96,14 @@ pub struct OwnSymptom {
     pub counts: Counts,
 }
 
+impl OwnSymptom {
+    /// The set that holds it alone.
+    #[must_use]
+    pub const fn set(self) -> u32 {
+        1 << self.bit
+    }
+}
+
 /// When a symptom counts as one of a decision epoch's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

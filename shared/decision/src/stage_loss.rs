@@ -51,11 +51,9 @@ impl StageLossMonitor {
         self.diagnosis_alone();
     }
 
-    /// A diagnosis has come, which holds no symptoms; true if the identifier was lost.
-    pub(crate) const fn diagnosis_alone(&mut self) -> bool {
-        let was_lost = self.identifier_is_lost();
+    /// A diagnosis has come, which holds no symptoms.
+    pub(crate) const fn diagnosis_alone(&mut self) {
         self.misses = 0;
-        was_lost
     }
 
     pub(crate) const fn identifier_is_lost(&self) -> bool {
@@ -106,9 +104,10 @@ mod tests {
         assert_eq!(diagnosed.lost_stages(), 0);
         diagnosed.diagnosis();
         let mut alone = lost();
-        assert!(alone.diagnosis_alone());
+        assert!(alone.identifier_is_lost());
+        alone.diagnosis_alone();
         assert_eq!(alone.lost_stages(), 2);
-        assert!(!alone.diagnosis_alone());
+        assert!(!alone.identifier_is_lost());
         assert!(alone.no_detection(), "the fifth in a row");
         alone.detection();
         assert!((0..4).all(|_| !alone.no_detection()));

@@ -5,7 +5,7 @@ use vigil_blocks::{Action, ControlMode, DetectionBelief, FaultBelief, RecoveryKi
 use vigil_robot::{Description, FaultTree};
 
 use crate::alarm_fusion::Situation;
-use crate::decision_process::{DecisionProcess, DecisionRule, Instruction};
+use crate::decision_process::{DecisionProcess, DecisionRule};
 use crate::epoch::{End, Epoch, Limits, SymptomKinds};
 use crate::error::SupervisorError;
 use crate::hardware_belief::HardwareBelief;
@@ -214,11 +214,7 @@ impl SymptomDecision {
     fn choose(&mut self) {
         let process = &mut self.process;
         let best = process.decider.decide(process.tracker.belief()).choice();
-        let actions = &process.actions;
-        let kind = |action: usize| actions.get(action).map_or(RecoveryKind::Stop, |m| m.kind);
-        let before = std::mem::replace(&mut process.choice, self.latch.choose(best, kind)).action;
-        let action = process.choice.action;
-        self.wheels.choose(process.kind(action), action == before);
+        process.choose(best, &mut self.latch, &mut self.wheels);
     }
 
     /// Opens a new decision, whose outcome is waited for.
@@ -290,14 +286,7 @@ impl DecisionRule for SymptomDecision {
     }
 
     fn write(&mut self, action: &mut Action) {
-        let instruction = match self.process.control_mode {
-            ControlMode::Safe => self.process.safe_stop(),
-            _ => Instruction {
-                action: self.process.choice.action,
-                kind: self.process.kind(self.process.choice.action),
-                wheel: self.wheels.about(),
-            },
-        };
+        let instruction = self.process.instruction(&self.wheels);
         // The stop of the safe mode, and its end, are decisions of their own.
         let stops = |kind| kind == RecoveryKind::Stop;
         let last = self.last_kind.replace(instruction.kind);

@@ -65,23 +65,19 @@ impl Wheels {
 
     /// The wheel that an action of `kind` is about; `goes_on` if it is the action before. A way
     /// through an opening is driven as well as the robot can.
-    pub(crate) fn choose(&mut self, kind: RecoveryKind, goes_on: bool) -> Option<usize> {
+    pub(crate) fn choose(&mut self, kind: RecoveryKind, goes_on: bool) {
         let about = match kind {
             RecoveryKind::Compensate => self.most_probable(LeafKind::Stuck),
             RecoveryKind::IgnoreEncoder => self.most_probable(LeafKind::Encoder),
             RecoveryKind::GoThrough => self
                 .most_probable(LeafKind::Stuck)
                 .filter(|(_, p)| *p > NAMED),
-            _ => {
-                self.about = None;
-                return None;
-            }
+            _ => None,
         };
         // Another wheel than that of the action that goes on has to be more likely than not.
         let held = self.about.filter(|_| goes_on);
         let other = about.filter(|(_, p)| held.is_none() || *p > NAMED);
         self.about = other.map(|(wheel, _)| wheel).or(held);
-        self.about
     }
 
     /// The wheel of the present action.

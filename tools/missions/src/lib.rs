@@ -6,5 +6,6 @@ pub mod exceptions;
 pub mod learning;
 mod model_text;
 pub mod navigation;
+mod parameter_number;
 pub mod recovery;
 pub mod simulation;

@@ -3,16 +3,16 @@
 use std::fs;
 
 use vigil_blocks::{
-    Action, ControlMode, DECISION_ACTIONS, DetectionBelief, Entry, RecoveryKind, Symptoms,
+    Action, ControlMode, DECISION_ACTIONS, DetectionBelief, RecoveryKind, Symptoms,
 };
 use vigil_cycle::allocation::allocations;
-use vigil_decision::{Inputs, Settings, Supervisor};
+use vigil_decision::{Settings, Supervisor};
 use vigil_setup::graph_file::GraphFile;
 use vigil_setup::{Setup, load_graph};
 use vigil_supervisor::assemble;
 
-use crate::navigation::by_the_papers_model;
-use crate::world::{CYCLE_NS, World, config};
+use crate::navigation::{by_the_papers_model, cycle_without_diagnosis};
+use crate::world::{World, config};
 
 fn planning(settings: &mut Settings) {
     settings.policy = "despot".to_owned();
@@ -72,19 +72,12 @@ fn exceptions(supervisor: &mut Supervisor) -> Vec<(u32, [u64; DECISION_ACTIONS])
     let (mut action, mut detection) = (Action::default(), DetectionBelief::default());
     let mut said = Vec::new();
     for cycle in 0..3000_u32 {
-        detection.header.t_capture_ns += CYCLE_NS;
-        detection.symptoms = match cycle / 500 % 3 {
+        let symptoms = match cycle / 500 % 3 {
             1 => Symptoms::EPM,
             2 => Symptoms::LD,
             _ => 0,
         };
-        let inputs = Inputs {
-            diagnosis: None,
-            detection: Some(&detection),
-        };
-        let before = allocations();
-        supervisor.step(Entry::Frame(inputs), &mut action);
-        assert_eq!(allocations() - before, 0);
+        cycle_without_diagnosis(supervisor, symptoms, &mut detection, &mut action);
         said.push((action.action, action.value.map(f64::to_bits)));
     }
     said

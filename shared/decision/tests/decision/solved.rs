@@ -16,7 +16,7 @@ use vigil_setup::graph_file::GraphFile;
 use vigil_setup::{Setup, load_graph};
 use vigil_supervisor::assemble;
 
-use crate::navigation::by_the_papers_model;
+use crate::navigation::{by_the_papers_model, cycle_without_diagnosis};
 use crate::world::{CYCLE_NS, config};
 
 fn model(name: &str) -> Pomdp {
@@ -147,15 +147,8 @@ fn exceptions_are_met_by_a_solved_policy_without_allocating() {
     let (mut action, mut detection) = (Action::default(), DetectionBelief::default());
     let mut kinds = Vec::new();
     for cycle in 0..8000 {
-        detection.header.t_capture_ns += CYCLE_NS;
-        detection.symptoms = if cycle < 2000 { 0 } else { Symptoms::EPM };
-        let inputs = Inputs {
-            diagnosis: None,
-            detection: Some(&detection),
-        };
-        let before = allocations();
-        supervisor.step(Entry::Frame(inputs), &mut action);
-        assert_eq!(allocations() - before, 0);
+        let symptoms = if cycle < 2000 { 0 } else { Symptoms::EPM };
+        cycle_without_diagnosis(&mut supervisor, symptoms, &mut detection, &mut action);
         demand_complete(&action);
         assert_eq!(action.control_mode, ControlMode::Policy as u32);
         let kind = RecoveryKind::from_repr(action.kind).unwrap();

@@ -84,8 +84,9 @@ impl Solution {
 /// Solves the fully observable relaxation of `model`.
 ///
 /// # Errors
-/// [`SolveError::Unbounded`] and [`SolveError::Mass`] for values without bound, such as those of a
-/// discount of 1; [`SolveError::Size`] for a system that is neither solved by iteration nor small.
+/// [`SolveError::Unbounded`] and [`SolveError::Mass`] for values without bound; with discount 1
+/// what the model lacks for a goal problem; [`SolveError::Size`] for a system that is neither
+/// solved by iteration nor small.
 pub fn solve(model: &Pomdp) -> Result<Solution, SolveError> {
     solve_within(model, &mut Budget::new(&mut || false))
 }

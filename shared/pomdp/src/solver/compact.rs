@@ -52,6 +52,17 @@ pub struct Compact {
     pub loss_error: f64,
 }
 
+/// Standard errors by which the loss of a small policy is thought to be more than in the sample.
+const LOSS_ERRORS: f64 = 4.0;
+
+impl Compact {
+    /// What the policy loses, by a wide margin: the mean and four standard errors.
+    #[must_use]
+    pub fn loss_max(&self) -> f64 {
+        self.loss_mean + LOSS_ERRORS * self.loss_error
+    }
+}
+
 /// A policy of at most `vectors_max` of `vectors`. With discount 1 it is all of them if so few do
 /// not come to an end. Equal inputs give equal policies.
 ///

@@ -5,6 +5,7 @@ use vigil_pomdp::policy::{DespotError, DespotOptions, Measure, PolicyKind};
 use vigil_pomdp::solver::{Options, solve};
 use vigil_pomdp::{AlphaVectors, Budget, Despot, PointBased, Policy, Pomdp, mdp};
 
+use crate::point_based::look_ahead;
 use crate::public::TIGER;
 
 /// Look at a lamp, or say which it is. Nothing moves.
@@ -40,25 +41,12 @@ fn options(scenarios: usize, trials: usize) -> DespotOptions {
     }
 }
 
-/// max_a' of the exact values one step after the action, of every action.
+/// The exact value of every action, one step and then the best.
 fn exact_values(model: &Pomdp, vectors: &AlphaVectors, belief: &[f64]) -> Vec<f64> {
-    let of_action = |action: usize| {
-        let mut next = vec![0.0; belief.len()];
-        let mut value = 0.0;
-        for (s, b) in belief.iter().enumerate() {
-            value += b * model.reward(s, action);
-            for (to, p) in model.successors(s, action) {
-                next[*to] += b * p;
-            }
-        }
-        for z in 0..model.observations().len() {
-            let column = model.likelihood(action, z).iter();
-            let joint: Vec<f64> = next.iter().zip(column).map(|(b, p)| b * p).collect();
-            value += model.discount() * vectors.value(&joint);
-        }
-        value
-    };
-    (0..model.actions().len()).map(of_action).collect()
+    let actions = 0..model.actions().len();
+    actions
+        .map(|action| look_ahead(model, vectors, belief, action))
+        .collect()
 }
 
 #[test]

@@ -27,7 +27,7 @@ fn solved(model: &Pomdp, precision: f64) -> AlphaVectors {
 }
 
 /// R(b,a) + gamma sum_o p(o|b,a) V(b_o), V being the best of the vectors: dense, by the definition.
-fn look_ahead(model: &Pomdp, vectors: &AlphaVectors, belief: &[f64], action: usize) -> f64 {
+pub fn look_ahead(model: &Pomdp, vectors: &AlphaVectors, belief: &[f64], action: usize) -> f64 {
     let mut predicted = vec![0.0; belief.len()];
     let mut sum = 0.0;
     for (s, b) in belief.iter().enumerate() {

@@ -4,6 +4,11 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
+use crate::parameter_number::{self, NumberError, out_of_range};
+
+/// What the sum of chances may be off: many chances are added up.
+const SUM_ROUNDING: f64 = 1e-9;
+
 /// Everything that the model is made from.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -102,24 +107,9 @@ pub struct Exception {
 /// A parameter that means nothing.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ParameterError {
-    /// A number is out of range.
-    #[error("{key}: {found} is out of range: allowed is {allowed}")]
-    Range {
-        /// Key in the file.
-        key: String,
-        /// What was found.
-        found: f64,
-        /// What is allowed.
-        allowed: &'static str,
-    },
-    /// Chances of which one at most comes true add up to more than 1.
-    #[error("{key}: the chances add up to {sum}; allowed is up to 1")]
-    Sum {
-        /// Keys in the file.
-        key: String,
-        /// Their sum.
-        sum: f64,
-    },
+    /// A number is out of range, or chances add up to more than 1.
+    #[error(transparent)]
+    Number(#[from] NumberError),
     /// A name that nothing has.
     #[error("{key}: there is no '{found}'; allowed are {allowed}")]
     Unknown {
@@ -212,7 +202,7 @@ impl Parameters {
         probability("arises", exception.arises)?;
         probability("passes", exception.passes)?;
         if let Some(found) = exception.follow.filter(|found| !found.is_finite()) {
-            return Err(out_of_range(&key("follow"), found, "any number"));
+            return Err(out_of_range(&key("follow"), found, "any number").into());
         }
         for (of, price) in [
             ("price", exception.price),
@@ -274,15 +264,7 @@ fn range(
 ) -> Result<(), ParameterError> {
     match range.contains(&found) {
         true => Ok(()),
-        false => Err(out_of_range(key, found, allowed)),
-    }
-}
-
-fn out_of_range(key: &str, found: f64, allowed: &'static str) -> ParameterError {
-    ParameterError::Range {
-        key: key.to_owned(),
-        found,
-        allowed,
+        false => Err(out_of_range(key, found, allowed).into()),
     }
 }
 
@@ -298,11 +280,5 @@ fn known(key: &str, found: &str, names: &[&str]) -> Result<(), ParameterError> {
 }
 
 fn at_most_one(key: &str, sum: f64) -> Result<(), ParameterError> {
-    match sum <= 1.0 + 1e-9 {
-        true => Ok(()),
-        false => Err(ParameterError::Sum {
-            key: key.to_owned(),
-            sum,
-        }),
-    }
+    Ok(parameter_number::at_most_one(key, sum, SUM_ROUNDING)?)
 }

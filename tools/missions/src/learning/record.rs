@@ -1,5 +1,7 @@
 //! What was recorded of one mission.
 
+use std::ops::ControlFlow;
+
 use crate::simulation::{Agent, Episode, Mission, Rules, run_watched};
 use vigil_pomdp::Pomdp;
 
@@ -134,6 +136,7 @@ impl Record {
                 }
                 record.labels.push(Some(seen.after as u32));
             }
+            ControlFlow::Continue(())
         });
         (record, mission)
     }

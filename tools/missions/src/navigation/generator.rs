@@ -1,6 +1,6 @@
 //! From parameters to the text of a `.pomdp` file.
 
-use super::{ACTIONS, ParameterError, Parameters, STATES};
+use super::{ACTIONS, NumberError, Parameters, STATES};
 use crate::model_text::{line, number};
 
 const HEAD: &str = "\
@@ -20,8 +20,8 @@ const HEAD: &str = "\
 /// Writes the model, in Cassandra's format.
 ///
 /// # Errors
-/// [`ParameterError`] if a parameter means nothing.
-pub fn generate(parameters: &Parameters) -> Result<String, ParameterError> {
+/// [`NumberError`] if a parameter means nothing.
+pub fn generate(parameters: &Parameters) -> Result<String, NumberError> {
     parameters.check()?;
     let mut text = String::from(HEAD);
     let names: Vec<String> = observations().map(|o| o.name()).collect();

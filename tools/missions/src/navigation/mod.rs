@@ -12,10 +12,10 @@
 mod generator;
 mod parameters;
 
+pub use crate::parameter_number::NumberError;
 pub use generator::generate;
 pub use parameters::{
-    Outcomes, ParameterError, Parameters, PerException, PerState, Prices, Remedies, Rewards,
-    Symptoms,
+    Outcomes, Parameters, PerException, PerState, Prices, Remedies, Rewards, Symptoms,
 };
 
 /// States: nominal, and the paper's exceptions.

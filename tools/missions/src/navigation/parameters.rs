@@ -2,6 +2,8 @@
 
 use serde::Deserialize;
 
+use crate::parameter_number::{NumberError, at_most_one, out_of_range};
+
 /// Everything that the model is made from.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -133,29 +135,6 @@ pub struct Prices {
     pub gu: f64,
 }
 
-/// A parameter that means nothing.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ParameterError {
-    /// A number is out of range.
-    #[error("{key}: {found} is out of range: allowed is {allowed}")]
-    Range {
-        /// Key in the file.
-        key: String,
-        /// What was found.
-        found: f64,
-        /// What is allowed.
-        allowed: &'static str,
-    },
-    /// Chances of which one at most comes true add up to more than 1.
-    #[error("{key}: the chances add up to {sum}; allowed is up to 1")]
-    Sum {
-        /// Keys in the file.
-        key: String,
-        /// Their sum.
-        sum: f64,
-    },
-}
-
 impl PerException {
     /// In the order of [`super::STATES`] without the nominal one.
     #[must_use]
@@ -178,8 +157,8 @@ impl Parameters {
     /// Checks ranges and sums.
     ///
     /// # Errors
-    /// The first [`ParameterError`].
-    pub fn check(&self) -> Result<(), ParameterError> {
+    /// The first [`NumberError`].
+    pub fn check(&self) -> Result<(), NumberError> {
         if !(0.0..1.0).contains(&self.discount) {
             let allowed = "0 to below 1";
             return Err(out_of_range("discount", self.discount, allowed));
@@ -210,19 +189,19 @@ impl Parameters {
         for (key, table) in states {
             probabilities(key, &table.values())?;
         }
-        at_most_one("arises", self.arises.values().iter().sum())?;
+        at_most_one("arises", self.arises.values().iter().sum(), 0.0)?;
         for (key, one, other) in [
             ("symptoms.eps + symptoms.epm", symptoms.eps, symptoms.epm),
             ("outcomes.alt + outcomes.nna", outcomes.alt, outcomes.nna),
         ] {
             for (a, b) in one.values().iter().zip(other.values()) {
-                at_most_one(key, a + b)?;
+                at_most_one(key, a + b, 0.0)?;
             }
         }
         self.check_rewards()
     }
 
-    fn check_rewards(&self) -> Result<(), ParameterError> {
+    fn check_rewards(&self) -> Result<(), NumberError> {
         let allowed = "any finite number";
         let fp = self.rewards.fp.values();
         if let Some(&found) = fp.iter().find(|r| !r.is_finite()) {
@@ -249,27 +228,9 @@ impl Parameters {
     }
 }
 
-fn probabilities(key: &str, values: &[f64]) -> Result<(), ParameterError> {
+fn probabilities(key: &str, values: &[f64]) -> Result<(), NumberError> {
     match values.iter().find(|p| !(0.0..=1.0).contains(*p)) {
         Some(&found) => Err(out_of_range(key, found, "0 to 1")),
         None => Ok(()),
     }
-}
-
-fn out_of_range(key: &str, found: f64, allowed: &'static str) -> ParameterError {
-    ParameterError::Range {
-        key: key.to_owned(),
-        found,
-        allowed,
-    }
-}
-
-fn at_most_one(key: &str, sum: f64) -> Result<(), ParameterError> {
-    if sum > 1.0 {
-        return Err(ParameterError::Sum {
-            key: key.to_owned(),
-            sum,
-        });
-    }
-    Ok(())
 }

@@ -1,5 +1,7 @@
 //! Who acts in a mission.
 
+use std::borrow::BorrowMut;
+
 use vigil_pomdp::Pomdp;
 use vigil_pomdp::policy::{Control, Decider};
 use vigil_pomdp::{Evidence, Tracker};
@@ -26,16 +28,16 @@ pub trait Agent {
 }
 
 /// A policy, and the belief that it acts on.
-pub struct PolicyAgent<'m> {
+pub struct PolicyAgent<'m, D = Decider> {
     model: &'m Pomdp,
     tracker: Tracker,
-    decider: Decider,
+    decider: D,
 }
 
-impl<'m> PolicyAgent<'m> {
-    /// Believes in `model`, decides by `decider`.
+impl<'m, D: BorrowMut<Decider>> PolicyAgent<'m, D> {
+    /// Believes in `model`, decides by `decider`, its own or a borrowed one.
     #[must_use]
-    pub fn new(model: &'m Pomdp, decider: Decider) -> Self {
+    pub fn new(model: &'m Pomdp, decider: D) -> Self {
         let tracker = Tracker::new(model);
         Self {
             model,
@@ -51,14 +53,15 @@ impl<'m> PolicyAgent<'m> {
     }
 }
 
-impl Agent for PolicyAgent<'_> {
+impl<D: BorrowMut<Decider>> Agent for PolicyAgent<'_, D> {
     fn begin(&mut self) {
         self.tracker.reset();
-        self.decider.reset();
+        self.decider.borrow_mut().reset();
     }
 
     fn decide(&mut self, _chance: f64) -> Act {
-        let decision = self.decider.decide(self.tracker.belief());
+        let decider = self.decider.borrow_mut();
+        let decision = decider.decide(self.tracker.belief());
         Act {
             action: decision.action,
             control: decision.control,

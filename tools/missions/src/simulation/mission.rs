@@ -1,5 +1,7 @@
 //! One mission.
 
+use std::ops::ControlFlow;
+
 use super::agent::Agent;
 use super::stream::Episode;
 use super::world::World;
@@ -77,16 +79,18 @@ pub struct HiddenStep {
 
 /// The mission of an agent in a world that follows `model`.
 pub fn run(model: &Pomdp, agent: &mut dyn Agent, rules: &Rules, episode: Episode) -> Mission {
-    run_watched(model, agent, rules, episode, &mut |_| ())
+    run_watched(model, agent, rules, episode, &mut |_| {
+        ControlFlow::Continue(())
+    })
 }
 
-/// As [`run`]; `watch` is shown every step.
+/// As [`run`]; `watch` is shown every step, and may break the mission off.
 pub fn run_watched(
     model: &Pomdp,
     agent: &mut dyn Agent,
     rules: &Rules,
     episode: Episode,
-    watch: &mut dyn FnMut(HiddenStep),
+    watch: &mut dyn FnMut(HiddenStep) -> ControlFlow<()>,
 ) -> Mission {
     let mut world = World::new(model, episode);
     let mut mission = Mission::default();
@@ -96,7 +100,7 @@ pub fn run_watched(
         let act = agent.decide(world.chance());
         let before = world.state();
         let event = world.step(act.action);
-        watch(HiddenStep {
+        let goes_on = watch(HiddenStep {
             before,
             action: act.action,
             after: world.state(),
@@ -111,6 +115,9 @@ pub fn run_watched(
         mission.stalled_steps += usize::from(act.control == Control::Stalled);
         let is_end = rules.is_end.get(act.action).copied().unwrap_or(false);
         mission.is_ended = is_end || model.is_goal(world.state());
+        if goes_on.is_break() {
+            break;
+        }
         if !mission.is_ended {
             mission.impossible += usize::from(!agent.notice(act.action, event.observation));
         }

@@ -1,8 +1,6 @@
 //! The shipped navigation model: what its file holds, and the paper's two stories.
 
-use vigil_missions::navigation::{
-    ACTIONS, ENDS, ParameterError, Parameters, QUIET, STATES, generate,
-};
+use vigil_missions::navigation::{ACTIONS, ENDS, NumberError, Parameters, QUIET, STATES, generate};
 use vigil_missions::simulation::{
     Agent, Episode, Escalation, PairedDifference, PolicyAgent, Random, Rules, Summary, horizon, run,
 };
@@ -323,7 +321,7 @@ fn parameters_that_mean_nothing_are_refused_by_name() {
     assert!(message(|p| p.rewards.fp.hp = f64::INFINITY).contains("rewards.fp: inf"));
     let mut sum = parameters();
     sum.outcomes.nna.nnp = 1.0;
-    assert!(matches!(generate(&sum), Err(ParameterError::Sum { .. })));
+    assert!(matches!(generate(&sum), Err(NumberError::Sum { .. })));
     assert!(toml::from_str::<Parameters>(&PARAMETERS.replace("gu = 20.0", "")).is_err());
     assert!(toml::from_str::<Parameters>(&PARAMETERS.replace("nnp = 0.05", "nmp = 0.05")).is_err());
 }

@@ -1,6 +1,7 @@
 //! The navigation model behind the supervisor, with symptoms and outcomes in each cycle.
 
 use vigil_blocks::{Action, ActionOutcome, DetectionBelief, Entry, FaultBelief, RecoveryKind};
+use vigil_cycle::allocation::allocations;
 use vigil_decision::{Compensation, Inputs, Settings, Supervisor};
 use vigil_pomdp::{Pomdp, Tracker};
 use vigil_robot::FaultTree;
@@ -170,3 +171,21 @@ pub fn assert_near(robot: &Navigation, expected: &[f64]) {
 
 /// Index of FP.
 pub const FP: usize = 0;
+
+/// A cycle with these symptoms and without a diagnosis, which must not allocate.
+pub fn cycle_without_diagnosis(
+    supervisor: &mut Supervisor,
+    symptoms: u32,
+    detection: &mut DetectionBelief,
+    action: &mut Action,
+) {
+    detection.header.t_capture_ns += CYCLE_NS;
+    detection.symptoms = symptoms;
+    let inputs = Inputs {
+        diagnosis: None,
+        detection: Some(detection),
+    };
+    let before = allocations();
+    supervisor.step(Entry::Frame(inputs), action);
+    assert_eq!(allocations() - before, 0);
+}

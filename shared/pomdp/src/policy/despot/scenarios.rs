@@ -3,10 +3,8 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use crate::fnv1a;
 use crate::weights::Weights;
-
-/// An odd number with bits in no order (the golden ratio in 64 bits).
-const MIXING: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// A state, and its weight.
 pub(super) type Scenario = (u32, f64);
@@ -32,8 +30,8 @@ impl Sampler {
     /// Begins anew: what follows depends on the seed and on `belief` alone.
     pub(super) fn begin(&mut self, belief: &Weights) {
         let hash = belief.support().iter().fold(self.seed, |hash, &state| {
-            let mixed = hash ^ belief.at(state).to_bits() ^ u64::from(state);
-            mixed.wrapping_mul(MIXING).rotate_left(29)
+            let hash = fnv1a::hash_u64(hash, u64::from(state));
+            fnv1a::hash_u64(hash, belief.at(state).to_bits())
         });
         self.rng = Pcg64Mcg::seed_from_u64(hash);
     }

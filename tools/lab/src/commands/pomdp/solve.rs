@@ -16,8 +16,6 @@ use super::{load, print, save};
 use vigil_terminal::{CommandError, Outcome};
 
 const BYTES_PER_GIB: f64 = (1_u64 << 30) as f64;
-/// Standard errors by which what a small policy loses is thought to be more than in the sample.
-const LOSS_ERRORS: f64 = 4.0;
 /// Progress is printed when this factor of time has passed since the last line.
 const PROGRESS_FACTOR: f64 = 1.5;
 /// ... the first time after so many seconds.
@@ -169,7 +167,7 @@ fn policy(args: &Args, model: &Pomdp, answer: &Answer) -> Result<Exported, Comma
     );
     match small {
         Ok(small) => Ok(Exported {
-            lower: lower - small.loss_mean - LOSS_ERRORS * small.loss_error,
+            lower: lower - small.loss_max(),
             vectors: small.vectors,
         }),
         // Whoever ends the search wants what there is.
