@@ -6,6 +6,7 @@ import inspect
 import os
 import pathlib
 import pickle
+import signal
 import subprocess
 import sys
 import tempfile
@@ -234,6 +235,9 @@ class LongCalls(unittest.TestCase):
     """Another thread can only speak while a long call lets it."""
 
     def interrupted(self, call):
+        # Started in the background, Python ignores Ctrl-C.
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        self.addCleanup(signal.signal, signal.SIGINT, before)
         threading.Timer(0.2, _thread.interrupt_main).start()
         with self.assertRaises(KeyboardInterrupt):
             call()
