@@ -8,6 +8,7 @@ use vigil_setup::{Setup, SetupError, load_graph};
 
 pub mod archive;
 pub mod chain;
+pub mod corridors;
 pub mod field;
 pub mod ground_change;
 pub mod latency;
@@ -19,6 +20,7 @@ pub mod results;
 pub mod run_time;
 pub mod simulated;
 pub mod taped_wheels;
+pub mod tuning;
 
 /// What the question of this name ends with: 0, or 1 and the reason.
 pub fn ended(name: &str, result: Result<(), Box<dyn Error>>) -> ExitCode {

@@ -31,6 +31,8 @@ struct Program {
 enum Question {
     /// Are verdicts and actions the same, bit for bit, as those of `bench/bits.txt`?
     Bits(bits::Args),
+    /// What are the decisions worth in corridors? Random missions: Vigil, and the best ladder.
+    Corridors(corridors::Args),
     /// Does the diagnosis hold in the field: for hours, over gaps, on other grounds, with other
     /// lags?
     Field(field::Args),
@@ -83,6 +85,7 @@ impl Question {
     fn answer(&self) -> Result<(), Box<dyn Error>> {
         match self {
             Self::Bits(args) => bits::run(args),
+            Self::Corridors(args) => corridors::run(args),
             Self::Field(args) => field::run(args),
             Self::FirstMinute => first_minute::run(),
             Self::GroundChange => ground_change::run(),

@@ -14,7 +14,9 @@
 mod breakdown;
 mod commander;
 mod drive;
+mod explanation;
 mod kind;
+mod order;
 mod pilot;
 mod plan;
 mod prices;
@@ -25,16 +27,18 @@ mod sweep;
 mod table;
 mod told;
 
-pub use breakdown::{Breakdown, Cause, PresentFault};
+pub use breakdown::{Breakdown, Cause, PresentFault, WHEELS};
 pub use commander::Arm;
 pub use drive::{Mission, drive};
+pub use explanation::Explanations;
 pub use kind::Kind;
-pub use plan::Plan;
+pub use order::{action_block, order};
+pub use plan::{Plan, drawn_soil};
 pub use prices::{MissionFile, Prices};
 pub use report::{document, lines, say, shortfalls};
-pub use rules::{Rule, Rules};
-pub use score::{MEASURES, Measure, POINTS, Score};
-pub use sweep::{Tuned, tune};
+pub use rules::{Rule, RuleInput, RuleOutput, Rules};
+pub use score::{MEASURES, Measure, POINTS, Score, price_1_m};
+pub use sweep::mean_points;
 
 use std::error::Error;
 use std::path::Path;

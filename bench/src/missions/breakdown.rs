@@ -6,7 +6,7 @@ use rand_pcg::Pcg64Mcg;
 use super::kind::Kind;
 
 /// Wheels, in the order of the robot's.
-pub(super) const WHEELS: [&str; 6] = ["LF", "LM", "LR", "RF", "RM", "RR"];
+pub const WHEELS: [&str; 6] = ["LF", "LM", "LR", "RF", "RM", "RR"];
 /// Those that are steered.
 const STEERED: [usize; 4] = [0, 2, 3, 5];
 /// How an encoder breaks.

@@ -2,12 +2,13 @@
 
 use std::error::Error;
 
-use vigil_blocks::{Action, FaultBelief, MODE_MULTIPLE, RecoveryKind, SensorFrame};
+use vigil_blocks::{Action, RecoveryKind, SensorFrame};
 use vigil_evaluation::stages::Stages;
 
 use super::ShippedGraph;
-use super::breakdown::Cause;
-use super::rules::{Follower, Rule, RuleInput, RuleOutput};
+use super::explanation::Explanations;
+use super::order::action_block;
+use super::rules::{Follower, Rule, RuleOutput};
 use super::told::{self, Knowledge};
 use crate::simulated;
 
@@ -44,8 +45,7 @@ impl Arm {
 pub(super) struct Commander<'a> {
     shipped: &'a ShippedGraph,
     mind: Mind,
-    /// Leaves of the tree with what they mean.
-    leaves: Vec<(usize, Cause)>,
+    explanations: Explanations,
     action: Box<Action>,
 }
 
@@ -76,7 +76,7 @@ impl<'a> Commander<'a> {
         Ok(Self {
             shipped,
             mind,
-            leaves: leaves(shipped),
+            explanations: Explanations::new(&shipped.setup),
             action: Box::default(),
         })
     }
@@ -96,20 +96,13 @@ impl<'a> Commander<'a> {
             }
             Mind::Rule(stages, _, follower) => {
                 stages.take(frame);
-                let (explanation, p) = most_probable(&self.leaves, stages.diagnosis());
-                let alarm = stages.detection().alarm != 0;
-                let input = RuleInput {
-                    alarm,
-                    explanation,
-                    p,
-                    several: stages.diagnosis().mode == MODE_MULTIPLE,
-                };
-                follower.answer(input, dt_s)
+                let (detection, diagnosis) = (stages.detection(), stages.diagnosis());
+                follower.answer(self.explanations.input(detection, diagnosis), dt_s)
             }
             Mind::Without => RuleOutput::plain(RecoveryKind::GoOn),
             Mind::Told => told::best(&self.shipped.missions.prices, knowledge),
         };
-        self.set_action(output);
+        *self.action = action_block(&self.shipped.setup, output);
         &self.action
     }
 
@@ -119,53 +112,4 @@ impl<'a> Commander<'a> {
             *follower = Follower::new(*rule);
         }
     }
-
-    /// The action block of a kind, as the supervisor would write it.
-    fn set_action(&mut self, output: RuleOutput) {
-        let RuleOutput { kind, wheel } = output;
-        let steers = wheel.filter(|_| kind == RecoveryKind::Compensate);
-        let straight = (1.0, 0.0);
-        let (gain, offset) = steers.map_or(straight, |w| self.shipped.setup.model.compensation(w));
-        *self.action = Action {
-            decision_seq: 1,
-            kind: kind as u32,
-            wheel: wheel.map_or(u32::MAX, |wheel| wheel as u32),
-            speed_scale: output.speed_scale(),
-            curvature_gain: gain,
-            curvature_offset: offset,
-            valid_until_ns: u64::MAX,
-            ..Action::default()
-        };
-    }
-}
-
-fn leaves(shipped: &ShippedGraph) -> Vec<(usize, Cause)> {
-    let tree = &shipped.setup.tree;
-    let meaning = |node: usize| {
-        let fault = tree.nodes().get(node)?.fault.as_deref()?;
-        let (kind, wheel) = fault.split_once(':')?;
-        let wheel = shipped.setup.robot.wheel_index(wheel)?;
-        let cause = match kind {
-            "stuck" => Cause::Stuck(wheel),
-            _ => Cause::Encoder(wheel),
-        };
-        Some((node, cause))
-    };
-    tree.leaves().filter_map(meaning).collect()
-}
-
-/// The most probable explanation, `None` for none, and its probability. Ties go to none, then to
-/// the leaf that comes first.
-fn most_probable(leaves: &[(usize, Cause)], belief: &FaultBelief) -> (Option<Cause>, f64) {
-    let mut best = (None, belief.p[0]);
-    for &(node, cause) in leaves {
-        let p = belief.p.get(node).copied().unwrap_or(0.0);
-        if p > best.1 {
-            best = (Some(cause), p);
-        }
-    }
-    if belief.p_unknown > best.1 {
-        best = (Some(Cause::Unmodelled), belief.p_unknown);
-    }
-    best
 }

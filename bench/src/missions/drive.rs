@@ -8,10 +8,11 @@ use vigil_sensor_sim::{ActionGate, World};
 
 use super::breakdown::{Breakdown, PresentFault};
 use super::commander::{Arm, Commander};
+use super::order::order;
 use super::pilot::Pilot;
 use super::plan::Plan;
 use super::rules::RuleOutput;
-use super::score::{Score, Step, Tally, order};
+use super::score::{Score, Step, Tally};
 use super::told::{self, Knowledge};
 use super::{HELP_S, LIMIT_S, ShippedGraph};
 

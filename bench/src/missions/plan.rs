@@ -17,7 +17,7 @@ const CURVATURE_1_M: std::ops::Range<f64> = 0.1..0.5;
 const ONE_STRAIGHT_IN: u32 = 3;
 /// Speed of a segment, m/s.
 const SPEED_M_S: std::ops::Range<f64> = 0.15..0.3;
-/// Soil from mission to mission: as in the runs that the model was learned from.
+/// Soil from mission to mission.
 const MODULUS: std::ops::Range<f64> = 0.18..0.22;
 const FRICTION: std::ops::Range<f64> = 0.6..0.7;
 /// Seeds of one kind are so far from those of the next.
@@ -44,14 +44,9 @@ impl Plan {
     pub fn new(kind: Kind, seed: u64) -> Self {
         let seed = seed + kind as u64 * SEEDS;
         let mut rng = Pcg64Mcg::seed_from_u64(seed ^ 0x4d31_5510);
-        let simulator = Simulator {
-            friction: rng.random_range(FRICTION),
-            shear_modulus: rng.random_range(MODULUS),
-            ..Simulator::default()
-        };
         Self {
             seed,
-            simulator,
+            simulator: drawn_soil(&mut rng),
             segments: segments(&mut rng),
             kind,
             breakdown: Breakdown::drawn(kind, LENGTH_M, &mut rng),
@@ -64,6 +59,15 @@ impl Plan {
         let seeds = first_seed..first_seed + per_kind;
         let of_a_kind = |kind| seeds.clone().map(move |seed| Self::new(kind, seed));
         Kind::ALL.into_iter().flat_map(of_a_kind).collect()
+    }
+}
+
+/// A soil like those of the runs that the model was learned from.
+pub fn drawn_soil(rng: &mut Pcg64Mcg) -> Simulator {
+    Simulator {
+        friction: rng.random_range(FRICTION),
+        shear_modulus: rng.random_range(MODULUS),
+        ..Simulator::default()
     }
 }
 

@@ -11,7 +11,7 @@ pub use careful::{Careful, CarefulSettings};
 pub use ladder::{Ladder, LadderSettings};
 pub use stop_and_call::{StopAndCall, StopAndCallSettings};
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use vigil_blocks::RecoveryKind;
 
 use super::breakdown::Cause;
@@ -94,7 +94,8 @@ pub struct Rules {
 }
 
 /// A rule with its settings.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Rule {
     /// Looks, then remedies.
     Careful(CarefulSettings),

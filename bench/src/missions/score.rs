@@ -1,6 +1,6 @@
 //! What a mission brought.
 
-use vigil_blocks::{Action, RecoveryKind};
+use vigil_blocks::RecoveryKind;
 
 use super::breakdown::{Cause, PresentFault};
 use super::prices::Prices;
@@ -12,15 +12,6 @@ const UNANSWERED_MAX_M: f64 = 1.0;
 const OFF_PATH_MAX_M: f64 = 1.0;
 /// What is less than this share of what it grows to is not counted as unanswered.
 const SEVERE: f64 = 0.5;
-
-/// What an action block orders.
-#[must_use]
-pub(super) fn order(action: &Action) -> RuleOutput {
-    RuleOutput {
-        kind: RecoveryKind::from_repr(action.kind).unwrap_or(RecoveryKind::None),
-        wheel: (action.wheel != u32::MAX).then_some(action.wheel as usize),
-    }
-}
 
 /// True if the rover stands under an order.
 const fn stands(order: RuleOutput) -> bool {
@@ -37,12 +28,8 @@ fn remedies(order: RuleOutput, cause: Cause) -> bool {
 
 /// Price of a metre with these faults under an order, at a share of the planned speed. The price of
 /// a fault that is not answered falls with the speed.
-pub(super) fn price_1_m(
-    prices: &Prices,
-    faults: &[PresentFault],
-    order: RuleOutput,
-    speed: f64,
-) -> f64 {
+#[must_use]
+pub fn price_1_m(prices: &Prices, faults: &[PresentFault], order: RuleOutput, speed: f64) -> f64 {
     let of = &prices.fault_1_m;
     let priced = faults.iter().map(|fault| {
         let price = match (fault.cause, remedies(order, fault.cause)) {

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::machine;
 use vigil_bench::missions::{self, Mission, Plan, Rule, ShippedGraph};
+use vigil_bench::tuning::tune;
 use vigil_evaluation::parallel::in_parallel;
 
 /// Missions between two lines of progress.
@@ -95,7 +96,13 @@ fn sweep(args: &Args, shipped: &ShippedGraph) -> Result<(), Box<dyn Error>> {
         Rule::Ladder(rules.ladder),
         Rule::Careful(rules.careful),
     ] {
-        let tuned = missions::tune(shipped, &plans, rule, |line| eprintln!("{line}"))?;
+        let tuned = tune(
+            rule,
+            rule.dimensions(),
+            |rule, dimension| rule.varied(dimension),
+            |rule| missions::mean_points(shipped, &plans, rule),
+            |line| eprintln!("{} {line}", rule.name()),
+        )?;
         document[rule.name()] = tuned.document();
     }
     let document = stamped(document, args, began);

@@ -76,6 +76,12 @@ impl Simulation {
         self.world.change(change)
     }
 
+    /// True if the navigation has something within its bumper's reach.
+    #[must_use]
+    pub fn touches(&self) -> bool {
+        self.navigator.as_ref().is_some_and(Navigator::is_touching)
+    }
+
     /// What happened to the navigation in the last cycle, once.
     pub fn take_event(&mut self) -> Option<NavigatorEvent> {
         self.navigator.as_mut().and_then(Navigator::take_event)

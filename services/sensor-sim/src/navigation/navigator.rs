@@ -178,6 +178,12 @@ impl Navigator {
         self.event.take()
     }
 
+    /// True if something ahead is within the bumper's reach.
+    #[must_use]
+    pub const fn is_touching(&self) -> bool {
+        self.touched
+    }
+
     /// True once after help has come: every fault ends.
     pub fn take_help(&mut self) -> bool {
         std::mem::take(&mut self.was_helped)

@@ -1,0 +1,84 @@
+//! What Vigil is worth in corridors: whole missions of the simulated rover, in which the way is
+//! blocked, the robot is lost, a wheel or an encoder breaks, or two of these.
+//!
+//! A mission ([`CorridorPlan`]) is drawn from a seed. Each commander ([`CorridorArm`]) drives it in
+//! the same world, through navigation, detector, identifier and, for Vigil, supervisor, as they run
+//! live, in the frames' own time.
+//!
+//! - A mission ends at what the robot holds for its goal, when it gives up, or after [`LIMIT_S`].
+//! - Help comes [`HELP_S`] after it was called for, clears the way, mends the robot and tells it its
+//!   place.
+//! - What a mission is worth stands in `bench/corridors.toml`, apart from every decision model.
+
+mod commander;
+mod drive;
+mod exception;
+mod ladder;
+mod layout;
+mod plan;
+mod prices;
+mod report;
+mod score;
+
+pub use commander::CorridorArm;
+pub use drive::{CorridorMission, drive};
+pub use exception::{Exception, Group};
+pub use ladder::EscalationSettings;
+pub use plan::CorridorPlan;
+pub use prices::{CorridorFile, CorridorPrices};
+pub use report::{document, lines, say, shortfalls};
+pub use score::CorridorScore;
+
+use std::error::Error;
+
+use vigil_setup::{Setup, load_graph};
+
+use crate::missions::{MissionFile, Prices};
+
+/// Longest mission, s.
+pub const LIMIT_S: f64 = 300.0;
+/// Time until called help has come and mended everything, s: as in `missions`.
+pub const HELP_S: f64 = crate::missions::HELP_S;
+
+/// The graph as it ships, and what is needed to judge missions.
+#[derive(Debug, Clone)]
+pub struct CorridorGraph {
+    /// The configuration; its corridor is replaced by that of each mission.
+    pub setup: Setup,
+    /// Prices and rules.
+    pub file: CorridorFile,
+    /// Prices of what is driven with a fault.
+    pub faults: Prices,
+}
+
+impl CorridorGraph {
+    /// Reads `corridor-people.toml`, frames coming `rate_hz` times a second, decisions by `decision`
+    /// instead of its own model if that is given, and the prices.
+    ///
+    /// # Errors
+    /// A configuration that is refused.
+    pub fn read(rate_hz: f64, decision: Option<&str>) -> Result<Self, Box<dyn Error>> {
+        let path = crate::root().join("config/corridor-people.toml");
+        let setup = load_graph(&path, |file| {
+            file.graph.rate_hz = rate_hz;
+            if let Some(decision) = decision {
+                file.files.decision = decision.into();
+            }
+        })?;
+        Ok(Self {
+            setup,
+            file: CorridorFile::read()?,
+            faults: MissionFile::read()?.prices,
+        })
+    }
+
+    /// The commanders, Vigil first.
+    #[must_use]
+    pub const fn arms(&self) -> [CorridorArm; 3] {
+        [
+            CorridorArm::Vigil,
+            CorridorArm::Ladder(self.file.ladder),
+            CorridorArm::Without,
+        ]
+    }
+}

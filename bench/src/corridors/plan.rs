@@ -1,0 +1,269 @@
+//! What is to be driven, and what goes wrong.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use vigil_setup::graph_file::{Navigation, Obstacle, Simulator, Trouble, TroubleKind};
+
+use super::exception::{Exception, Group};
+use super::layout::Layout;
+use crate::missions::{Cause, WHEELS, drawn_soil};
+
+/// Share of missions without an exception, and of those with two.
+const NOTHING: f64 = 0.15;
+const TWO: f64 = 0.3;
+/// When it begins, s: on the way.
+const BEGINS_S: std::ops::Range<f64> = 3.0..15.0;
+/// How long people stay after the robot has come to them, s.
+const STAY_S: std::ops::Range<f64> = 5.0..60.0;
+/// What fills a corridor: a disc of this radius, m, and how far it is from the middle at most.
+const FILLS_M: f64 = 1.25;
+const ASIDE_M: f64 = 0.2;
+/// What can be passed: its radius and its distance from the middle, m.
+const PASSED_M: std::ops::Range<f64> = 0.4..0.6;
+const PASSED_ASIDE_M: f64 = 0.9;
+/// A person's radius, and how far three people abreast stand apart, m.
+const PERSON_M: f64 = 0.25;
+const ABREAST_M: f64 = 0.7;
+/// Free way before and behind what stands in the way, m.
+const BEFORE_M: f64 = 3.5;
+const BEHIND_M: f64 = 2.0;
+/// Jump of the believed pose: of the place, m, and of the heading, rad.
+const JUMP_M: std::ops::Range<f64> = 0.3..1.0;
+const JUMP_RAD: std::ops::Range<f64> = 0.1..0.4;
+/// Turn of a wrong heading, rad.
+const TURN_RAD: std::ops::Range<f64> = 0.5..1.2;
+/// How an encoder breaks.
+const BROKEN: [&str; 3] = ["zero", "frozen", "noise"];
+
+/// A fault of the hardware.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HardwareFault {
+    /// When it begins, s.
+    pub at_s: f64,
+    /// Change of the world, as `vigil inject` takes it.
+    pub change: String,
+    /// What it is.
+    pub cause: Cause,
+}
+
+/// A mission.
+#[derive(Debug, Clone)]
+pub struct CorridorPlan {
+    /// Seed of everything in it.
+    pub seed: u64,
+    /// Soil, noise, lag.
+    pub simulator: Simulator,
+    /// Corridor, what stands in it, and what happens to the robot.
+    pub navigation: Navigation,
+    /// What breaks.
+    pub hardware: Option<HardwareFault>,
+    /// What goes wrong.
+    pub exceptions: Vec<Exception>,
+}
+
+impl CorridorPlan {
+    /// The mission of a seed, with the settings of `shipped`.
+    #[must_use]
+    pub fn new(shipped: &Navigation, seed: u64) -> Self {
+        let mut rng = Pcg64Mcg::seed_from_u64(seed ^ 0xc022_1d02);
+        let layout = Layout::drawn(shipped, &mut rng);
+        let mut plan = Self {
+            seed,
+            simulator: drawn_soil(&mut rng),
+            navigation: layout.navigation.clone(),
+            hardware: None,
+            exceptions: exceptions(&mut rng),
+        };
+        for exception in plan.exceptions.clone() {
+            plan.add(exception, &layout, &mut rng);
+        }
+        plan
+    }
+
+    /// So many missions, from a seed on.
+    #[must_use]
+    pub fn many(shipped: &Navigation, count: u64, first_seed: u64) -> Vec<Self> {
+        let seeds = first_seed..first_seed + count;
+        seeds.map(|seed| Self::new(shipped, seed)).collect()
+    }
+
+    /// What goes wrong, in words.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let names: Vec<&str> = self.exceptions.iter().map(|it| it.name()).collect();
+        match names.is_empty() {
+            true => Group::Nothing.name().to_owned(),
+            false => names.join(" + "),
+        }
+    }
+
+    /// What it is about.
+    #[must_use]
+    pub fn group(&self) -> Group {
+        match self.exceptions.as_slice() {
+            [] => Group::Nothing,
+            [only] => only.group(),
+            _ => Group::Two,
+        }
+    }
+
+    fn add(&mut self, exception: Exception, layout: &Layout, rng: &mut Pcg64Mcg) {
+        match exception {
+            Exception::Blocked => self.block(layout, rng),
+            Exception::People => self.add_people(layout, rng),
+            Exception::Opening => self.stand_aside(layout, rng),
+            Exception::Phantom => {
+                let x_m = place(layout, rng);
+                self.trouble(TroubleKind::Phantom, 0.0, [x_m, 0.0, 0.0]);
+            }
+            Exception::Blind => {
+                self.trouble(TroubleKind::Blind, 0.0, [0.0; 3]);
+                self.stand_aside(layout, rng);
+            }
+            Exception::Lost => {
+                let (jump_m, to) = (rng.random_range(JUMP_M), rng.random_range(0.0..1.0));
+                let (sin, cos) = (std::f64::consts::TAU * to).sin_cos();
+                let yaw_rad = signed(JUMP_RAD, rng);
+                let at_s = rng.random_range(BEGINS_S);
+                let jump = [jump_m * cos, jump_m * sin, yaw_rad];
+                self.trouble(TroubleKind::Mislocalised, at_s, jump);
+            }
+            Exception::WrongHeading => {
+                let (at_s, yaw_rad) = (rng.random_range(BEGINS_S), signed(TURN_RAD, rng));
+                self.trouble(TroubleKind::WrongHeading, at_s, [0.0, 0.0, yaw_rad]);
+            }
+            Exception::Stuck => {
+                let wheel = rng.random_range(0..WHEELS.len());
+                let change = format!("stuck:{}", WHEELS[wheel]);
+                self.breaks(change, Cause::Stuck(wheel), rng);
+            }
+            Exception::Encoder => {
+                let wheel = rng.random_range(0..WHEELS.len());
+                let how = BROKEN[rng.random_range(0..BROKEN.len())];
+                let change = format!("encoder:{}:{how}", WHEELS[wheel]);
+                self.breaks(change, Cause::Encoder(wheel), rng);
+            }
+        }
+    }
+
+    fn breaks(&mut self, change: String, cause: Cause, rng: &mut Pcg64Mcg) {
+        self.hardware = Some(HardwareFault {
+            at_s: rng.random_range(BEGINS_S),
+            change,
+            cause,
+        });
+    }
+
+    fn trouble(&mut self, kind: TroubleKind, at_s: f64, [x_m, y_m, yaw_rad]: [f64; 3]) {
+        self.navigation.trouble.push(Trouble {
+            kind,
+            at_s,
+            x_m,
+            y_m,
+            yaw_rad,
+        });
+    }
+
+    fn obstacle(&mut self, [x_m, y_m]: [f64; 2], radius_m: f64, until_s: Option<f64>) {
+        self.navigation.obstacle.push(Obstacle {
+            x_m,
+            y_m,
+            radius_m,
+            from_s: 0.0,
+            until_s,
+        });
+    }
+
+    /// Where another way turns off, what fills the first lies behind that.
+    fn block(&mut self, layout: &Layout, rng: &mut Pcg64Mcg) {
+        let x_m = match layout.has_alternative {
+            true => layout.leg_m - ASIDE_M,
+            false => place(layout, rng),
+        };
+        let y_m = rng.random_range(-ASIDE_M..ASIDE_M);
+        self.obstacle([x_m, y_m], FILLS_M, None);
+    }
+
+    fn add_people(&mut self, layout: &Layout, rng: &mut Pcg64Mcg) {
+        let x_m = place(layout, rng);
+        let comes_s = x_m / self.navigation.speed_m_s;
+        let until_s = comes_s + rng.random_range(STAY_S);
+        for y_m in [-ABREAST_M, 0.0, ABREAST_M] {
+            self.obstacle([x_m, y_m], PERSON_M, Some(until_s));
+        }
+    }
+
+    fn stand_aside(&mut self, layout: &Layout, rng: &mut Pcg64Mcg) {
+        let x_m = place(layout, rng);
+        let y_m = if rng.random_bool(0.5) { 1.0 } else { -1.0 } * PASSED_ASIDE_M;
+        self.obstacle([x_m, y_m], rng.random_range(PASSED_M), None);
+    }
+}
+
+/// A place on the first leg, m.
+fn place(layout: &Layout, rng: &mut Pcg64Mcg) -> f64 {
+    rng.random_range(BEFORE_M..layout.leg_m - BEHIND_M)
+}
+
+/// A number of the range, positive or negative.
+fn signed(range: std::ops::Range<f64>, rng: &mut Pcg64Mcg) -> f64 {
+    let size = rng.random_range(range);
+    if rng.random_bool(0.5) { size } else { -size }
+}
+
+/// None, one, or two of different groups.
+fn exceptions(rng: &mut Pcg64Mcg) -> Vec<Exception> {
+    let pick = |of: &[Exception], rng: &mut Pcg64Mcg| of[rng.random_range(0..of.len())];
+    let share: f64 = rng.random_range(0.0..1.0);
+    if share < NOTHING {
+        return Vec::new();
+    }
+    if share >= NOTHING + TWO {
+        let all = [
+            &Exception::WAY[..],
+            &Exception::PLACE[..],
+            &Exception::HARDWARE[..],
+        ];
+        return vec![pick(&all.concat(), rng)];
+    }
+    let mut groups = vec![
+        &Exception::WAY[..],
+        &Exception::PLACE[..],
+        &Exception::HARDWARE[..],
+    ];
+    groups.remove(rng.random_range(0..groups.len()));
+    groups.into_iter().map(|of| pick(of, rng)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::corridors::CorridorGraph;
+
+    #[test]
+    fn missions_are_drawn_by_their_seed_and_their_graph_is_one_that_loads() {
+        let graph = CorridorGraph::read(100.0, None).unwrap();
+        let shipped = graph.setup.file.navigation.clone().unwrap();
+        let plans = CorridorPlan::many(&shipped, 300, 9);
+        let share = |group| plans.iter().filter(|it| it.group() == group).count() as f64 / 300.0;
+        // A share of p has a standard error of less than .03.
+        assert!(
+            (share(Group::Nothing) - NOTHING).abs() < 0.1,
+            "{}",
+            share(Group::Nothing)
+        );
+        assert!((share(Group::Two) - TWO).abs() < 0.1);
+        for plan in &plans {
+            let mut setup = graph.setup.clone();
+            setup.file.navigation = Some(plan.navigation.clone());
+            setup.file.simulator = plan.simulator.clone();
+            assert!(vigil_sensor_sim::assemble(&setup, &[]).is_ok());
+            for change in plan.hardware.iter().map(|it| &it.change) {
+                vigil_robot::Injection::parse_change(change, &setup.robot).unwrap();
+            }
+        }
+        let again = CorridorPlan::new(&shipped, 9);
+        assert_eq!(again.navigation, plans[0].navigation);
+        assert_ne!(again.navigation, plans[1].navigation);
+    }
+}

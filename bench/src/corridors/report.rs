@@ -1,0 +1,205 @@
+//! Missions in corridors in words and numbers.
+
+use serde_json::{Value, json};
+use vigil_missions::simulation::{PairedDifference, Summary};
+
+use super::commander::CorridorArm;
+use super::drive::CorridorMission;
+use super::exception::Group;
+use super::score::{CorridorScore, MEASURES, Measure};
+use super::{HELP_S, LIMIT_S};
+use crate::archive::Archive;
+
+/// Largest probability of Vigil's lead, were there none.
+const P_MAX: f64 = 1e-3;
+
+/// What was driven, by whom.
+struct Table<'a> {
+    arms: &'a [CorridorArm],
+    missions: &'a [CorridorMission],
+}
+
+impl Table<'_> {
+    /// Values of a commander, in missions of a group or all.
+    fn values(&self, group: Option<Group>, arm: usize, of: fn(&CorridorScore) -> f64) -> Vec<f64> {
+        let is_of = |m: &&CorridorMission| group.is_none_or(|group| m.plan.group() == group);
+        let missions = self.missions.iter().filter(is_of);
+        missions.filter_map(|m| m.scores.get(arm)).map(of).collect()
+    }
+
+    fn mean(&self, group: Option<Group>, arm: usize, measure: Measure) -> Summary {
+        Summary::new(&mut self.values(group, arm, measure.2))
+    }
+
+    /// Vigil less another commander.
+    fn against(&self, group: Option<Group>, arm: usize, measure: Measure) -> PairedDifference {
+        let ours = self.values(group, 0, measure.2);
+        PairedDifference::new(&ours, &self.values(group, arm, measure.2))
+    }
+
+    fn figures(&self, group: Option<Group>) -> Value {
+        let mut figures = json!({});
+        for (at, arm) in self.arms.iter().enumerate() {
+            for measure in MEASURES {
+                let found = self.mean(group, at, measure);
+                let mut value = json!({"mean": found.mean, "half_width_95": found.half_width});
+                if at > 0 {
+                    let found = self.against(group, at, measure);
+                    value["vigil_minus_this"] = json!({
+                        "mean": found.difference,
+                        "half_width_95": found.half_width,
+                        "p": found.p,
+                    });
+                }
+                figures[arm.name()][measure.0] = value;
+            }
+        }
+        figures
+    }
+}
+
+/// Groups with their names, then all missions.
+fn selections() -> Vec<(Option<Group>, &'static str)> {
+    let groups = Group::ALL.map(|group| (Some(group), group.name()));
+    groups.into_iter().chain([(None, "all")]).collect()
+}
+
+/// All figures.
+#[must_use]
+pub fn document(arms: &[CorridorArm], missions: &[CorridorMission]) -> Value {
+    let table = Table { arms, missions };
+    let mut document = json!({
+        "missions": missions.len(), "limit_s": LIMIT_S, "help_s": HELP_S,
+        "short": shortfalls(arms, missions),
+    });
+    for (group, name) in selections() {
+        document["figures"][name] = table.figures(group);
+    }
+    document
+}
+
+/// One line of CSV per mission and commander, with a head.
+#[must_use]
+pub fn lines(arms: &[CorridorArm], missions: &[CorridorMission]) -> String {
+    let keys: Vec<&str> = MEASURES.iter().map(|measure| measure.0).collect();
+    let mut text = format!("seed,exceptions,commander,{}\n", keys.join(","));
+    for mission in missions {
+        let plan = &mission.plan;
+        for (arm, score) in arms.iter().zip(&mission.scores) {
+            let values = MEASURES.map(|measure| format!("{:.4}", measure.2(score)));
+            let (seed, name) = (plan.seed, plan.name());
+            let values = values.join(",");
+            text.push_str(&format!("{seed},{name},{},{values}\n", arm.name()));
+        }
+    }
+    text
+}
+
+/// The report.
+pub fn say(archive: &mut Archive, arms: &[CorridorArm], missions: &[CorridorMission]) {
+    let table = Table { arms, missions };
+    archive.say(&format!(
+        "{} missions in corridors of 8 to 12 m, half of them with another way to the goal; \
+         exceptions, places, soils and noise are drawn from seeds. Every commander drives each of \
+         them in the same world, through navigation, detector and identifier. At most {LIMIT_S:.0} \
+         s; help comes {HELP_S:.0} s after it was called. Points: `bench/corridors.toml`. *ladder*: \
+         tuned on other missions (`--sweep`).\n",
+        missions.len(),
+    ));
+    archive.say(
+        "| points, mean ± 95 % | missions | Vigil | ladder | without | Vigil less ladder | p |",
+    );
+    archive.say("|---|---|---|---|---|---|---|");
+    let points = MEASURES[0];
+    for (group, name) in selections() {
+        let cell = |arm| {
+            let found = table.mean(group, arm, points);
+            format!("{:.1} ± {:.1}", found.mean, found.half_width)
+        };
+        let found = table.against(group, 1, points);
+        archive.say(&format!(
+            "| {name} | {} | {} | {} | {} | {:+.1} ± {:.1} | {:.1e} |",
+            table.values(group, 0, points.2).len(),
+            cell(0),
+            cell(1),
+            cell(2),
+            found.difference,
+            found.half_width,
+            found.p,
+        ));
+    }
+    archive.say("\n| mean of all | Vigil | ladder | without |");
+    archive.say("|---|---|---|---|");
+    for measure in MEASURES.into_iter().skip(1) {
+        let cell = |arm| format!("{:.*}", measure.3, table.mean(None, arm, measure).mean);
+        archive.say(&format!(
+            "| {} | {} | {} | {} |",
+            measure.1,
+            cell(0),
+            cell(1),
+            cell(2)
+        ));
+    }
+    archive.say("");
+    let short = shortfalls(arms, missions);
+    for line in &short {
+        archive.say(&format!("- Short: {line}."));
+    }
+    if short.is_empty() {
+        archive.say("Vigil is above the ladder, p < .001.");
+    }
+}
+
+/// The bars that are missed.
+#[must_use]
+pub fn shortfalls(arms: &[CorridorArm], missions: &[CorridorMission]) -> Vec<String> {
+    let table = Table { arms, missions };
+    let is_ladder = |arm: &CorridorArm| matches!(arm, CorridorArm::Ladder(_));
+    let ladder = arms.iter().position(is_ladder);
+    let found = ladder.map(|ladder| table.against(None, ladder, MEASURES[0]));
+    let leads = |it: &PairedDifference| it.difference > 0.0 && it.p < P_MAX;
+    let short = found.filter(|it| !leads(it));
+    let text = |it: PairedDifference| {
+        let (difference, half_width, p) = (it.difference, it.half_width, it.p);
+        format!(
+            "{difference:+.1} ± {half_width:.1} against the ladder, p {p:.1e}, bar above 0 and p < .001"
+        )
+    };
+    short.map(text).into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::corridors::{CorridorGraph, CorridorPlan};
+
+    #[test]
+    fn the_bar_is_judged_by_the_paired_difference() {
+        let graph = CorridorGraph::read(100.0, None).unwrap();
+        let arms = graph.arms();
+        let shipped = graph.setup.file.navigation.clone().unwrap();
+        let driven = |lead: f64| -> Vec<CorridorMission> {
+            let mission = |plan: CorridorPlan| {
+                let noise = (plan.seed % 3) as f64;
+                let score = |points: f64| CorridorScore {
+                    points,
+                    ..CorridorScore::default()
+                };
+                CorridorMission {
+                    scores: vec![score(lead + noise), score(1.0), score(0.0)],
+                    plan,
+                }
+            };
+            CorridorPlan::many(&shipped, 30, 0)
+                .into_iter()
+                .map(mission)
+                .collect()
+        };
+        // The differences lead - 1 + {0, 1, 2} have a standard error of .15.
+        assert!(shortfalls(&arms, &driven(1.0)).is_empty());
+        assert_eq!(shortfalls(&arms, &driven(0.2)).len(), 1);
+        assert_eq!(shortfalls(&arms, &driven(-3.0)).len(), 1);
+        let csv = lines(&arms, &driven(1.0));
+        assert_eq!(csv.lines().count(), 1 + 30 * 3);
+    }
+}
