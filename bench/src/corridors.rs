@@ -6,8 +6,8 @@
 //! live, in the frames' own time.
 //!
 //! - A mission ends at what the robot holds for its goal, when it gives up, or after [`LIMIT_S`].
-//! - Help comes [`HELP_S`] after it was called for, clears the way, mends the robot and tells it its
-//!   place.
+//! - Help comes [`HELP_S`] after it was called for, clears the way, mends the robot and tells it
+//!   its place.
 //! - What a mission is worth stands in `bench/corridors.toml`, apart from every decision model.
 
 mod commander;
@@ -52,8 +52,8 @@ pub struct CorridorGraph {
 }
 
 impl CorridorGraph {
-    /// Reads `corridor-people.toml`, frames coming `rate_hz` times a second, decisions by `decision`
-    /// instead of its own model if that is given, and the prices.
+    /// Reads the prices and `corridor-people.toml`; frames come `rate_hz` times a second, and
+    /// `decision`, if given, stands for its decision model.
     ///
     /// # Errors
     /// A configuration that is refused.

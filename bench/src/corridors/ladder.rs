@@ -9,8 +9,8 @@
 //! 4. After the last rung of the last round, call for help. Without symptoms for a while, begin at
 //!    the foot again.
 //!
-//! What the identifier names with enough probability is answered meanwhile: counter-steer, or ignore
-//! the encoder, on every rung. What it cannot name for a while is a call for help.
+//! What the identifier names with enough probability is answered meanwhile: counter-steer, or
+//! ignore the encoder, on every rung. What it cannot name for a while is a call for help.
 
 use serde::{Deserialize, Serialize};
 use vigil_blocks::{ActionOutcome, RecoveryKind, Symptoms};

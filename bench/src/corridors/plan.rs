@@ -114,10 +114,13 @@ impl CorridorPlan {
             Exception::Opening => self.stand_aside(layout, rng),
             Exception::Phantom => {
                 let x_m = place(layout, rng);
-                self.trouble(TroubleKind::Phantom, 0.0, [x_m, 0.0, 0.0]);
+                let phantom = trouble(TroubleKind::Phantom, 0.0);
+                self.navigation.trouble.push(Trouble { x_m, ..phantom });
             }
             Exception::Blind => {
-                self.trouble(TroubleKind::Blind, 0.0, [0.0; 3]);
+                self.navigation
+                    .trouble
+                    .push(trouble(TroubleKind::Blind, 0.0));
                 self.stand_aside(layout, rng);
             }
             Exception::Lost => {
@@ -125,12 +128,17 @@ impl CorridorPlan {
                 let (sin, cos) = (std::f64::consts::TAU * to).sin_cos();
                 let yaw_rad = signed(JUMP_RAD, rng);
                 let at_s = rng.random_range(BEGINS_S);
-                let jump = [jump_m * cos, jump_m * sin, yaw_rad];
-                self.trouble(TroubleKind::Mislocalised, at_s, jump);
+                self.navigation.trouble.push(Trouble {
+                    x_m: jump_m * cos,
+                    y_m: jump_m * sin,
+                    yaw_rad,
+                    ..trouble(TroubleKind::Mislocalised, at_s)
+                });
             }
             Exception::WrongHeading => {
                 let (at_s, yaw_rad) = (rng.random_range(BEGINS_S), signed(TURN_RAD, rng));
-                self.trouble(TroubleKind::WrongHeading, at_s, [0.0, 0.0, yaw_rad]);
+                let turned = trouble(TroubleKind::WrongHeading, at_s);
+                self.navigation.trouble.push(Trouble { yaw_rad, ..turned });
             }
             Exception::Stuck => {
                 let wheel = rng.random_range(0..WHEELS.len());
@@ -154,26 +162,6 @@ impl CorridorPlan {
         });
     }
 
-    fn trouble(&mut self, kind: TroubleKind, at_s: f64, [x_m, y_m, yaw_rad]: [f64; 3]) {
-        self.navigation.trouble.push(Trouble {
-            kind,
-            at_s,
-            x_m,
-            y_m,
-            yaw_rad,
-        });
-    }
-
-    fn obstacle(&mut self, [x_m, y_m]: [f64; 2], radius_m: f64, until_s: Option<f64>) {
-        self.navigation.obstacle.push(Obstacle {
-            x_m,
-            y_m,
-            radius_m,
-            from_s: 0.0,
-            until_s,
-        });
-    }
-
     /// Where another way turns off, what fills the first lies behind that.
     fn block(&mut self, layout: &Layout, rng: &mut Pcg64Mcg) {
         let x_m = match layout.has_alternative {
@@ -181,7 +169,10 @@ impl CorridorPlan {
             false => place(layout, rng),
         };
         let y_m = rng.random_range(-ASIDE_M..ASIDE_M);
-        self.obstacle([x_m, y_m], FILLS_M, None);
+        self.navigation.obstacle.push(Obstacle {
+            y_m,
+            ..obstacle(x_m, FILLS_M)
+        });
     }
 
     fn add_people(&mut self, layout: &Layout, rng: &mut Pcg64Mcg) {
@@ -189,14 +180,43 @@ impl CorridorPlan {
         let comes_s = x_m / self.navigation.speed_m_s;
         let until_s = comes_s + rng.random_range(STAY_S);
         for y_m in [-ABREAST_M, 0.0, ABREAST_M] {
-            self.obstacle([x_m, y_m], PERSON_M, Some(until_s));
+            self.navigation.obstacle.push(Obstacle {
+                y_m,
+                until_s: Some(until_s),
+                ..obstacle(x_m, PERSON_M)
+            });
         }
     }
 
     fn stand_aside(&mut self, layout: &Layout, rng: &mut Pcg64Mcg) {
         let x_m = place(layout, rng);
         let y_m = if rng.random_bool(0.5) { 1.0 } else { -1.0 } * PASSED_ASIDE_M;
-        self.obstacle([x_m, y_m], rng.random_range(PASSED_M), None);
+        let radius_m = rng.random_range(PASSED_M);
+        self.navigation.obstacle.push(Obstacle {
+            y_m,
+            ..obstacle(x_m, radius_m)
+        });
+    }
+}
+
+const fn trouble(kind: TroubleKind, at_s: f64) -> Trouble {
+    Trouble {
+        kind,
+        at_s,
+        x_m: 0.0,
+        y_m: 0.0,
+        yaw_rad: 0.0,
+    }
+}
+
+/// In the middle of the first leg, from the beginning on.
+const fn obstacle(x_m: f64, radius_m: f64) -> Obstacle {
+    Obstacle {
+        x_m,
+        y_m: 0.0,
+        radius_m,
+        from_s: 0.0,
+        until_s: None,
     }
 }
 

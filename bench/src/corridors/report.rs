@@ -102,8 +102,8 @@ pub fn say(archive: &mut Archive, arms: &[CorridorArm], missions: &[CorridorMiss
         "{} missions in corridors of 8 to 12 m, half of them with another way to the goal; \
          exceptions, places, soils and noise are drawn from seeds. Every commander drives each of \
          them in the same world, through navigation, detector and identifier. At most {LIMIT_S:.0} \
-         s; help comes {HELP_S:.0} s after it was called. Points: `bench/corridors.toml`. *ladder*: \
-         tuned on other missions (`--sweep`).\n",
+         s; help comes {HELP_S:.0} s after it was called. Points: `bench/corridors.toml`. \
+         *ladder*: tuned on other missions (`--sweep`).\n",
         missions.len(),
     ));
     archive.say(
@@ -162,7 +162,8 @@ pub fn shortfalls(arms: &[CorridorArm], missions: &[CorridorMission]) -> Vec<Str
     let text = |it: PairedDifference| {
         let (difference, half_width, p) = (it.difference, it.half_width, it.p);
         format!(
-            "{difference:+.1} ± {half_width:.1} against the ladder, p {p:.1e}, bar above 0 and p < .001"
+            "{difference:+.1} ± {half_width:.1} against the ladder, p {p:.1e}, \
+             bar above 0 and p < .001"
         )
     };
     short.map(text).into_iter().collect()
