@@ -19,6 +19,7 @@ mod plan;
 mod prices;
 mod report;
 mod score;
+mod sweep;
 
 pub use commander::CorridorArm;
 pub use drive::{CorridorMission, drive};
@@ -28,6 +29,7 @@ pub use plan::CorridorPlan;
 pub use prices::{CorridorFile, CorridorPrices};
 pub use report::{document, lines, say, shortfalls};
 pub use score::CorridorScore;
+pub use sweep::mean_points;
 
 use std::error::Error;
 

@@ -27,7 +27,7 @@ mod sweep;
 mod table;
 mod told;
 
-pub use breakdown::{Breakdown, Cause, PresentFault, WHEELS};
+pub use breakdown::{Breakdown, Cause, PresentFault, drawn_wheel, encoder, stuck};
 pub use commander::Arm;
 pub use drive::{Mission, drive};
 pub use explanation::Explanations;
@@ -37,7 +37,7 @@ pub use plan::{Plan, drawn_soil};
 pub use prices::{MissionFile, Prices};
 pub use report::{document, lines, say, shortfalls};
 pub use rules::{Rule, RuleInput, RuleOutput, Rules};
-pub use score::{MEASURES, Measure, POINTS, Score, price_1_m};
+pub use score::{MEASURES, Measure, POINTS, Score, measure, price_1_m};
 pub use sweep::mean_points;
 
 use std::error::Error;

@@ -16,3 +16,105 @@ pub mod real_logs;
 pub mod size;
 pub mod solver;
 pub mod taped_wheels;
+
+use std::error::Error;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use serde_json::{Value, json};
+use vigil_bench::archive::Archive;
+use vigil_bench::machine;
+use vigil_evaluation::parallel::in_parallel;
+
+/// Missions between two lines of progress.
+const PROGRESS: usize = 100;
+/// First seed of a sweep: no measurement takes one of these.
+const SWEEP_SEED: u64 = 1_000_000;
+
+/// Options of the questions that drive missions.
+#[derive(Debug, clap::Args)]
+pub struct MissionArgs {
+    /// Seed of the first.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    first_seed: u64,
+    /// Rate of the frames, Hz.
+    #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = from_zero)]
+    rate: f64,
+    /// Tune the rules instead, on missions of their own, from where they stand.
+    #[arg(long)]
+    sweep: bool,
+    /// Print one JSON document, archive nothing.
+    #[arg(long)]
+    json: bool,
+}
+
+impl MissionArgs {
+    /// Seed of the first mission; a sweep has its own.
+    const fn first_seed(&self) -> u64 {
+        match self.sweep {
+            true => SWEEP_SEED,
+            false => self.first_seed,
+        }
+    }
+
+    /// Prints the document as JSON, or archives it with the lines of its missions, if there are
+    /// any, and what `say` says of it.
+    fn keep(
+        &self,
+        question: &str,
+        mut document: Value,
+        began: Instant,
+        lines: Option<String>,
+        say: impl FnOnce(&mut Archive),
+    ) -> Result<(), Box<dyn Error>> {
+        document["machine"] = machine::facts();
+        document["rate_hz"] = json!(self.rate);
+        document["wall_s"] = json!(began.elapsed().as_secs_f64());
+        if self.json {
+            println!("{document:#}");
+            return Ok(());
+        }
+        let mut archive = Archive::new(question)?;
+        archive.store(&format!("{question}.json"), &document)?;
+        if let Some(lines) = lines {
+            archive.store_text(&format!("{question}.csv"), &lines)?;
+        }
+        say(&mut archive);
+        archive.close()?;
+        Ok(())
+    }
+}
+
+/// Every mission on all cores, with progress on standard error.
+fn drive_all<P: Sync, M: Send>(
+    plans: &[P],
+    drive: impl Fn(&P) -> Result<M, Box<dyn Error>> + Sync,
+) -> Result<Vec<M>, Box<dyn Error>> {
+    let (began, done) = (Instant::now(), AtomicUsize::new(0));
+    let drive = |plan: &P| {
+        let mission = drive(plan).map_err(|e| e.to_string());
+        let so_far = done.fetch_add(1, Ordering::Relaxed) + 1;
+        if so_far % PROGRESS == 0 {
+            let (count, passed_s) = (plans.len(), began.elapsed().as_secs_f64());
+            eprintln!("{so_far} of {count} missions in {passed_s:.0} s");
+        }
+        mission
+    };
+    let missions: Result<Vec<M>, String> = in_parallel(plans, drive).into_iter().collect();
+    Ok(missions?)
+}
+
+/// Refuses to have missed bars.
+fn demand_none(missed: &[String]) -> Result<(), Box<dyn Error>> {
+    match missed.len() {
+        0 => Ok(()),
+        count => Err(format!("{count} bars are missed").into()),
+    }
+}
+
+/// A finite number of at least 0.
+fn from_zero(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    let number = number.filter(|n: &f64| n.is_finite() && *n >= 0.0);
+    number.ok_or_else(|| "allowed is a number from 0".to_owned())
+}

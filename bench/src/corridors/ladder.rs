@@ -185,12 +185,12 @@ impl Escalation {
 
     /// The ladder's order, `dt_s` after the last cycle.
     pub(super) fn order(&mut self, input: LadderInput, dt_s: f64) -> LadderOrder {
-        let had_ended = self.phase;
+        let before = self.phase;
         self.phase = self.next_phase(input, dt_s);
-        let is_new = match (had_ended, self.phase) {
-            (Phase::Climbing { .. }, Phase::Climbing { for_s, .. }) => for_s == 0.0,
-            _ => false,
-        };
+        // The same rung may be climbed twice in a row.
+        let climbs = |phase| matches!(phase, Phase::Climbing { .. });
+        let is_new =
+            climbs(before) && matches!(self.phase, Phase::Climbing { for_s, .. } if for_s == 0.0);
         let output = self.output(input.hardware);
         if is_new || self.last != Some(output) {
             (self.number, self.last) = (self.number + 1, Some(output));

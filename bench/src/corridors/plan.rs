@@ -6,7 +6,7 @@ use vigil_setup::graph_file::{Navigation, Obstacle, Simulator, Trouble, TroubleK
 
 use super::exception::{Exception, Group};
 use super::layout::Layout;
-use crate::missions::{Cause, WHEELS, drawn_soil};
+use crate::missions::{Cause, drawn_soil, drawn_wheel, encoder, stuck};
 
 /// Share of missions without an exception, and of those with two.
 const NOTHING: f64 = 0.15;
@@ -32,8 +32,6 @@ const JUMP_M: std::ops::Range<f64> = 0.3..1.0;
 const JUMP_RAD: std::ops::Range<f64> = 0.1..0.4;
 /// Turn of a wrong heading, rad.
 const TURN_RAD: std::ops::Range<f64> = 0.5..1.2;
-/// How an encoder breaks.
-const BROKEN: [&str; 3] = ["zero", "frozen", "noise"];
 
 /// A fault of the hardware.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,15 +65,18 @@ impl CorridorPlan {
     pub fn new(shipped: &Navigation, seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed ^ 0xc022_1d02);
         let layout = Layout::drawn(shipped, &mut rng);
+        let simulator = drawn_soil(&mut rng);
+        let exceptions = exceptions(&mut rng);
         let mut plan = Self {
             seed,
-            simulator: drawn_soil(&mut rng),
+            simulator,
             navigation: layout.navigation.clone(),
             hardware: None,
-            exceptions: exceptions(&mut rng),
+            exceptions: Vec::new(),
         };
-        for exception in plan.exceptions.clone() {
+        for exception in exceptions {
             plan.add(exception, &layout, &mut rng);
+            plan.exceptions.push(exception);
         }
         plan
     }
@@ -141,15 +142,12 @@ impl CorridorPlan {
                 self.navigation.trouble.push(Trouble { yaw_rad, ..turned });
             }
             Exception::Stuck => {
-                let wheel = rng.random_range(0..WHEELS.len());
-                let change = format!("stuck:{}", WHEELS[wheel]);
-                self.breaks(change, Cause::Stuck(wheel), rng);
+                let (change, cause) = stuck(drawn_wheel(rng));
+                self.breaks(change, cause, rng);
             }
             Exception::Encoder => {
-                let wheel = rng.random_range(0..WHEELS.len());
-                let how = BROKEN[rng.random_range(0..BROKEN.len())];
-                let change = format!("encoder:{}:{how}", WHEELS[wheel]);
-                self.breaks(change, Cause::Encoder(wheel), rng);
+                let (change, cause) = encoder(drawn_wheel(rng), rng);
+                self.breaks(change, cause, rng);
             }
         }
     }
@@ -238,19 +236,14 @@ fn exceptions(rng: &mut Pcg64Mcg) -> Vec<Exception> {
     if share < NOTHING {
         return Vec::new();
     }
-    if share >= NOTHING + TWO {
-        let all = [
-            &Exception::WAY[..],
-            &Exception::PLACE[..],
-            &Exception::HARDWARE[..],
-        ];
-        return vec![pick(&all.concat(), rng)];
-    }
     let mut groups = vec![
         &Exception::WAY[..],
         &Exception::PLACE[..],
         &Exception::HARDWARE[..],
     ];
+    if share >= NOTHING + TWO {
+        return vec![pick(&groups.concat(), rng)];
+    }
     groups.remove(rng.random_range(0..groups.len()));
     groups.into_iter().map(|of| pick(of, rng)).collect()
 }

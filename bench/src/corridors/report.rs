@@ -6,9 +6,10 @@ use vigil_missions::simulation::{PairedDifference, Summary};
 use super::commander::CorridorArm;
 use super::drive::CorridorMission;
 use super::exception::Group;
-use super::score::{CorridorScore, MEASURES, Measure};
+use super::score::{CorridorScore, MEASURES, POINTS};
 use super::{HELP_S, LIMIT_S};
 use crate::archive::Archive;
+use crate::missions::Measure;
 
 /// Largest probability of Vigil's lead, were there none.
 const P_MAX: f64 = 1e-3;
@@ -27,14 +28,19 @@ impl Table<'_> {
         missions.filter_map(|m| m.scores.get(arm)).map(of).collect()
     }
 
-    fn mean(&self, group: Option<Group>, arm: usize, measure: Measure) -> Summary {
-        Summary::new(&mut self.values(group, arm, measure.2))
+    fn mean(&self, group: Option<Group>, arm: usize, measure: Measure<CorridorScore>) -> Summary {
+        Summary::new(&mut self.values(group, arm, measure.of))
     }
 
     /// Vigil less another commander.
-    fn against(&self, group: Option<Group>, arm: usize, measure: Measure) -> PairedDifference {
-        let ours = self.values(group, 0, measure.2);
-        PairedDifference::new(&ours, &self.values(group, arm, measure.2))
+    fn against(
+        &self,
+        group: Option<Group>,
+        arm: usize,
+        measure: Measure<CorridorScore>,
+    ) -> PairedDifference {
+        let ours = self.values(group, 0, measure.of);
+        PairedDifference::new(&ours, &self.values(group, arm, measure.of))
     }
 
     fn figures(&self, group: Option<Group>) -> Value {
@@ -51,7 +57,7 @@ impl Table<'_> {
                         "p": found.p,
                     });
                 }
-                figures[arm.name()][measure.0] = value;
+                figures[arm.name()][measure.key] = value;
             }
         }
         figures
@@ -81,12 +87,12 @@ pub fn document(arms: &[CorridorArm], missions: &[CorridorMission]) -> Value {
 /// One line of CSV per mission and commander, with a head.
 #[must_use]
 pub fn lines(arms: &[CorridorArm], missions: &[CorridorMission]) -> String {
-    let keys: Vec<&str> = MEASURES.iter().map(|measure| measure.0).collect();
+    let keys: Vec<&str> = MEASURES.iter().map(|measure| measure.key).collect();
     let mut text = format!("seed,exceptions,commander,{}\n", keys.join(","));
     for mission in missions {
         let plan = &mission.plan;
         for (arm, score) in arms.iter().zip(&mission.scores) {
-            let values = MEASURES.map(|measure| format!("{:.4}", measure.2(score)));
+            let values = MEASURES.map(|measure| format!("{:.4}", (measure.of)(score)));
             let (seed, name) = (plan.seed, plan.name());
             let values = values.join(",");
             text.push_str(&format!("{seed},{name},{},{values}\n", arm.name()));
@@ -103,23 +109,22 @@ pub fn say(archive: &mut Archive, arms: &[CorridorArm], missions: &[CorridorMiss
          exceptions, places, soils and noise are drawn from seeds. Every commander drives each of \
          them in the same world, through navigation, detector and identifier. At most {LIMIT_S:.0} \
          s; help comes {HELP_S:.0} s after it was called. Points: `bench/corridors.toml`. \
-         *ladder*: tuned on other missions (`--sweep`).\n",
+         *ladder*: `--sweep` tunes it on other missions.\n",
         missions.len(),
     ));
     archive.say(
         "| points, mean ± 95 % | missions | Vigil | ladder | without | Vigil less ladder | p |",
     );
     archive.say("|---|---|---|---|---|---|---|");
-    let points = MEASURES[0];
     for (group, name) in selections() {
         let cell = |arm| {
-            let found = table.mean(group, arm, points);
+            let found = table.mean(group, arm, POINTS);
             format!("{:.1} ± {:.1}", found.mean, found.half_width)
         };
-        let found = table.against(group, 1, points);
+        let found = table.against(group, 1, POINTS);
         archive.say(&format!(
             "| {name} | {} | {} | {} | {} | {:+.1} ± {:.1} | {:.1e} |",
-            table.values(group, 0, points.2).len(),
+            table.values(group, 0, POINTS.of).len(),
             cell(0),
             cell(1),
             cell(2),
@@ -131,10 +136,16 @@ pub fn say(archive: &mut Archive, arms: &[CorridorArm], missions: &[CorridorMiss
     archive.say("\n| mean of all | Vigil | ladder | without |");
     archive.say("|---|---|---|---|");
     for measure in MEASURES.into_iter().skip(1) {
-        let cell = |arm| format!("{:.*}", measure.3, table.mean(None, arm, measure).mean);
+        let cell = |arm| {
+            format!(
+                "{:.*}",
+                measure.decimals,
+                table.mean(None, arm, measure).mean
+            )
+        };
         archive.say(&format!(
             "| {} | {} | {} | {} |",
-            measure.1,
+            measure.name,
             cell(0),
             cell(1),
             cell(2)
@@ -156,7 +167,7 @@ pub fn shortfalls(arms: &[CorridorArm], missions: &[CorridorMission]) -> Vec<Str
     let table = Table { arms, missions };
     let is_ladder = |arm: &CorridorArm| matches!(arm, CorridorArm::Ladder(_));
     let ladder = arms.iter().position(is_ladder);
-    let found = ladder.map(|ladder| table.against(None, ladder, MEASURES[0]));
+    let found = ladder.map(|ladder| table.against(None, ladder, POINTS));
     let leads = |it: &PairedDifference| it.difference > 0.0 && it.p < P_MAX;
     let short = found.filter(|it| !leads(it));
     let text = |it: PairedDifference| {

@@ -3,7 +3,7 @@
 use vigil_blocks::RecoveryKind;
 
 use super::prices::CorridorPrices;
-use crate::missions::{Cause, PresentFault, Prices, RuleOutput, price_1_m};
+use crate::missions::{Cause, Measure, PresentFault, Prices, RuleOutput, measure, price_1_m};
 
 /// A pose is wrong if it is off by so much, m and rad.
 const WRONG_M: f64 = 0.25;
@@ -93,17 +93,17 @@ pub struct CorridorScore {
     pub lost_m: f64,
 }
 
-/// A figure of a mission: its key with unit, in words, its value, its decimals.
-pub(super) type Measure = (&'static str, &'static str, fn(&CorridorScore) -> f64, usize);
+/// The points, which decide.
+pub(super) const POINTS: Measure<CorridorScore> = measure("points", "points", |s| s.points, 1);
 
 /// What is reported of a mission; the points first.
-pub(super) const MEASURES: [Measure; 6] = [
-    ("points", "points", |s| s.points, 1),
-    ("done", "came to the goal", |s| s.done, 3),
-    ("time_s", "time, s", |s| s.time_s, 1),
-    ("calls", "calls for help", |s| s.calls, 3),
-    ("touches", "ran into something", |s| s.touches, 3),
-    ("lost_m", "driven with a wrong pose, m", |s| s.lost_m, 2),
+pub(super) const MEASURES: [Measure<CorridorScore>; 6] = [
+    POINTS,
+    measure("done", "came to the goal", |s| s.done, 3),
+    measure("time_s", "time, s", |s| s.time_s, 1),
+    measure("calls", "calls for help", |s| s.calls, 3),
+    measure("touches", "ran into something", |s| s.touches, 3),
+    measure("lost_m", "driven with a wrong pose, m", |s| s.lost_m, 2),
 ];
 
 #[cfg(test)]

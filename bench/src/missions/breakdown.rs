@@ -6,7 +6,7 @@ use rand_pcg::Pcg64Mcg;
 use super::kind::Kind;
 
 /// Wheels, in the order of the robot's.
-pub const WHEELS: [&str; 6] = ["LF", "LM", "LR", "RF", "RM", "RR"];
+pub(super) const WHEELS: [&str; 6] = ["LF", "LM", "LR", "RF", "RM", "RR"];
 /// Those that are steered.
 const STEERED: [usize; 4] = [0, 2, 3, 5];
 /// How an encoder breaks.
@@ -94,8 +94,8 @@ impl Breakdown {
         let onset_m = length_m * rng.random_range(ONSET);
         let (steps, expected) = match kind {
             Kind::Nothing => return None,
-            Kind::Stuck => lasting(stuck(wheel(rng))),
-            Kind::Encoder => lasting(encoder(wheel(rng), rng)),
+            Kind::Stuck => lasting(stuck(drawn_wheel(rng))),
+            Kind::Encoder => lasting(encoder(drawn_wheel(rng), rng)),
             Kind::Two => two(rng),
             Kind::Unmodelled => lasting(unmodelled(rng)),
             Kind::Intermittent => intermittent(rng),
@@ -126,15 +126,19 @@ const fn whole(cause: Cause) -> PresentFault {
     }
 }
 
-fn wheel(rng: &mut Pcg64Mcg) -> usize {
+/// Any wheel.
+pub fn drawn_wheel(rng: &mut Pcg64Mcg) -> usize {
     rng.random_range(0..WHEELS.len())
 }
 
-fn stuck(wheel: usize) -> (String, Cause) {
+/// The change that makes a wheel stick, as `vigil inject` takes it, and what then is wrong.
+#[must_use]
+pub fn stuck(wheel: usize) -> (String, Cause) {
     (format!("stuck:{}", WHEELS[wheel]), Cause::Stuck(wheel))
 }
 
-fn encoder(wheel: usize, rng: &mut Pcg64Mcg) -> (String, Cause) {
+/// The same for its encoder, broken in one of the ways that there are.
+pub fn encoder(wheel: usize, rng: &mut Pcg64Mcg) -> (String, Cause) {
     let how = BROKEN[rng.random_range(0..BROKEN.len())];
     let change = format!("encoder:{}:{how}", WHEELS[wheel]);
     (change, Cause::Encoder(wheel))
@@ -147,7 +151,7 @@ fn unmodelled(rng: &mut Pcg64Mcg) -> (String, Cause) {
 
 /// A specification with a wheel for its letter, and that wheel.
 fn placed(form: &str, rng: &mut Pcg64Mcg) -> (String, usize) {
-    let any = wheel(rng);
+    let any = drawn_wheel(rng);
     let steered = STEERED[rng.random_range(0..STEERED.len())];
     let text: Vec<&str> = form
         .split(':')
@@ -171,7 +175,7 @@ fn lasting((change, cause): (String, Cause)) -> Course {
 }
 
 fn two(rng: &mut Pcg64Mcg) -> Course {
-    let first = wheel(rng);
+    let first = drawn_wheel(rng);
     let second = (first + rng.random_range(1..WHEELS.len())) % WHEELS.len();
     let [a, b] = match rng.random_range(0..3) {
         0 => [stuck(first), stuck(second)],
@@ -195,7 +199,7 @@ fn two(rng: &mut Pcg64Mcg) -> Course {
 }
 
 fn intermittent(rng: &mut Pcg64Mcg) -> Course {
-    let wheel = wheel(rng);
+    let wheel = drawn_wheel(rng);
     let (change, cause) = match rng.random_range(0..2) {
         0 => stuck(wheel),
         _ => encoder(wheel, rng),

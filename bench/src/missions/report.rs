@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::commander::Arm;
 use super::drive::Mission;
 use super::kind::Kind;
-use super::score::{MEASURES, Measure, POINTS};
+use super::score::{MEASURES, Measure, POINTS, Score};
 use super::table::{Interval, ODDS, Table};
 use super::{HELP_S, LIMIT_S, MissionFile};
 use crate::archive::Archive;
@@ -124,7 +124,7 @@ enum Side {
 }
 
 /// Names and cells: every kind, then all kinds at each of the odds.
-fn rows(table: &Table<'_>, measure: Measure, side: Side) -> Vec<(String, Vec<String>)> {
+fn rows(table: &Table<'_>, measure: Measure<Score>, side: Side) -> Vec<(String, Vec<String>)> {
     let first = match side {
         Side::Mean => 0,
         Side::Difference => 1,
@@ -245,7 +245,7 @@ fn by_kind(table: &Table<'_>) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::missions::{Plan, Score, ShippedGraph};
+    use crate::missions::{Plan, ShippedGraph};
 
     #[test]
     fn bars_are_judged_by_the_paired_difference() {

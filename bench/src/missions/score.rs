@@ -141,24 +141,24 @@ impl Score {
     }
 }
 
-/// A figure of a mission.
+/// A figure of a mission, from its score.
 #[derive(Debug, Clone, Copy)]
-pub struct Measure {
+pub struct Measure<S> {
     /// Name with unit, as in raw data.
     pub key: &'static str,
     /// In words, with unit.
     pub name: &'static str,
     /// Its value.
-    pub of: fn(&Score) -> f64,
+    pub of: fn(&S) -> f64,
     /// Decimals shown.
     pub decimals: usize,
 }
 
 /// The points, which decide.
-pub const POINTS: Measure = measure("points", "points", |s| s.points, 1);
+pub const POINTS: Measure<Score> = measure("points", "points", |s| s.points, 1);
 
 /// What is reported of a mission; the points first.
-pub const MEASURES: [Measure; 10] = [
+pub const MEASURES: [Measure<Score>; 10] = [
     POINTS,
     measure(
         "unanswered_m",
@@ -186,12 +186,14 @@ pub const MEASURES: [Measure; 10] = [
     ),
 ];
 
-const fn measure(
+/// A figure of a mission; the fields of [`Measure`] in their order.
+#[must_use]
+pub const fn measure<S>(
     key: &'static str,
     name: &'static str,
-    of: fn(&Score) -> f64,
+    of: fn(&S) -> f64,
     decimals: usize,
-) -> Measure {
+) -> Measure<S> {
     Measure {
         key,
         name,

@@ -59,7 +59,7 @@ impl Table<'_> {
     }
 
     /// What a commander brings in missions of a kind.
-    pub(super) fn mean(&self, kind: Kind, arm: usize, measure: Measure) -> Interval {
+    pub(super) fn mean(&self, kind: Kind, arm: usize, measure: Measure<Score>) -> Interval {
         let found = Summary::new(&mut self.values(kind, arm, measure.of));
         Interval {
             mean: found.mean,
@@ -68,7 +68,7 @@ impl Table<'_> {
     }
 
     /// Vigil less another commander, in missions of a kind.
-    pub(super) fn against(&self, kind: Kind, arm: usize, measure: Measure) -> Interval {
+    pub(super) fn against(&self, kind: Kind, arm: usize, measure: Measure<Score>) -> Interval {
         let ours = self.values(kind, 0, measure.of);
         let found = PairedDifference::new(&ours, &self.values(kind, arm, measure.of));
         Interval {
@@ -109,8 +109,8 @@ impl Table<'_> {
     /// All figures of a selection: its name, the mean of a commander and the difference to it.
     fn figures(
         &self,
-        mean: impl Fn(usize, Measure) -> Interval,
-        against: impl Fn(usize, Measure) -> Interval,
+        mean: impl Fn(usize, Measure<Score>) -> Interval,
+        against: impl Fn(usize, Measure<Score>) -> Interval,
     ) -> Value {
         let mut figures = json!({});
         for (at, arm) in self.arms.iter().enumerate() {
