@@ -155,3 +155,30 @@ fn ride(
     }
     Ok(tally.score)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::corridors::Exception;
+
+    #[test]
+    fn a_ladder_goes_through_an_opening_to_its_goal() {
+        let graph = CorridorGraph::read(100.0, None).unwrap();
+        let shipped = graph.setup.file.navigation.clone().unwrap();
+        let mut plans = (0..).map(|seed| CorridorPlan::new(&shipped, seed));
+        // Smaller ones leave the middle of the corridor free; another way would do as well.
+        let blocks = |plan: &CorridorPlan| {
+            let navigation = &plan.navigation;
+            navigation.alternative.is_empty() && navigation.obstacle[0].radius_m > 0.5
+        };
+        let plan = plans.find(|it| it.exceptions == [Exception::Opening] && blocks(it));
+        let arms = [CorridorArm::Ladder(graph.file.ladder), CorridorArm::Without];
+        let [ladder, without] = drive(&graph, &plan.unwrap(), &arms).unwrap().scores[..] else {
+            unreachable!("two commanders have two scores");
+        };
+        assert_eq!((ladder.done, ladder.calls), (1.0, 0.0), "{ladder:?}");
+        // With rungs that are climbed in vain it takes a minute.
+        assert!(ladder.time_s < 45.0, "{ladder:?}");
+        assert_eq!(without.done, 0.0, "without, it stands before it");
+    }
+}

@@ -73,7 +73,10 @@ impl RuleOutput {
     #[must_use]
     pub const fn speed_scale(self) -> f64 {
         match self.kind {
-            RecoveryKind::GoOn | RecoveryKind::IgnoreEncoder => 1.0,
+            RecoveryKind::GoOn
+            | RecoveryKind::IgnoreEncoder
+            | RecoveryKind::GoThrough
+            | RecoveryKind::MoveAway => 1.0,
             RecoveryKind::Compensate => 0.7,
             RecoveryKind::SlowDown => 0.5,
             _ => 0.0,
