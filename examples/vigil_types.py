@@ -494,8 +494,8 @@ assert FaultBelief.size_kind.offset == 2752
 
 
 class Action(ctypes.LittleEndianStructure):
-    SCHEMA = 0x608FC64B66C4F8B7
-    TYPE_NAME = "vigil.Action.v1.608fc64b66c4f8b7"
+    SCHEMA = 0x09FDE6916EC19053
+    TYPE_NAME = "vigil.Action.v1.09fde6916ec19053"
 
     @staticmethod
     def type_name():
@@ -558,10 +558,16 @@ class Action(ctypes.LittleEndianStructure):
         ("alarm_count", ctypes.c_uint32),
         # Why nothing is seen: a Blindness; 0 while something is.
         ("blind", ctypes.c_uint32),
+        # Steps of the decision model so far, with symptoms; 0 with faults, whose evidence is no observation of the model.
+        ("step_count", ctypes.c_uint64),
+        # Action of the model's last step.
+        ("step_action", ctypes.c_uint32),
+        # Observation of the model's last step; u32::MAX for a set of symptoms that the model does not have.
+        ("step_observation", ctypes.c_uint32),
     ]
 
 
-assert ctypes.sizeof(Action) == 984
+assert ctypes.sizeof(Action) == 1000
 assert Action.header.offset == 0
 assert Action.cause.offset == 48
 assert Action.run_id.offset == 72
@@ -590,6 +596,9 @@ assert Action.alarm.offset == 964
 assert Action.alarm_t_capture_ns.offset == 968
 assert Action.alarm_count.offset == 976
 assert Action.blind.offset == 980
+assert Action.step_count.offset == 984
+assert Action.step_action.offset == 992
+assert Action.step_observation.offset == 996
 
 
 class Health(ctypes.LittleEndianStructure):

@@ -41,10 +41,13 @@ impl Simulation {
         };
         let command = self.gate.apply(planned, action, now_ns);
         self.world.step(dt_s, command);
-        let was_helped = self.navigator.as_mut().is_some_and(Navigator::take_help);
-        if was_helped {
+        let help = self.navigator.as_mut().and_then(Navigator::take_help);
+        if let Some(help) = help {
             // Ending what is on cannot fail: everything that can be injected can be ended.
             let _ = self.world.change(Change::ClearAll);
+            if let Some(place) = help.place {
+                self.world.set_at(place);
+            }
         }
         // After help or a relocalisation a new run begins: the filters forget a state that is no
         // longer true.
@@ -52,7 +55,7 @@ impl Simulation {
             .navigator
             .as_mut()
             .is_some_and(Navigator::take_relocalisation);
-        if was_helped || was_relocalised {
+        if help.is_some() || was_relocalised {
             self.world.begin_run();
         }
         command

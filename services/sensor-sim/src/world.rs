@@ -342,6 +342,11 @@ impl World {
         }
     }
 
+    /// Sets the rover down, at rest, at x m, y m, yaw rad.
+    pub const fn set_at(&mut self, pose: [f64; 3]) {
+        (self.pose, self.velocity) = (pose, [0.0; 3]);
+    }
+
     /// Sets the run's id as it appears in the frames; 1 at first. A new id resets every filter.
     pub fn set_run_id(&mut self, run_id: u64) {
         self.run_id = run_id;

@@ -53,6 +53,14 @@ pub(crate) struct Instruction {
     pub wheel: Option<usize>,
 }
 
+/// A step of the decision model.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Step {
+    pub action: usize,
+    /// `None` for what the model cannot observe.
+    pub observation: Option<usize>,
+}
+
 /// A decision model with its belief, policy and present choice.
 pub(crate) struct DecisionProcess {
     pub model: Pomdp,
@@ -66,6 +74,9 @@ pub(crate) struct DecisionProcess {
     pub decision_seq: u64,
     pub log_evidence: f64,
     pub impossible_count: u32,
+    /// Steps of the model, and the last one.
+    pub step_count: u64,
+    pub step: Step,
     pub control_mode: ControlMode,
     pub run_id: u64,
 }
@@ -91,6 +102,8 @@ impl DecisionProcess {
             decision_seq: 0,
             log_evidence: 0.0,
             impossible_count: 0,
+            step_count: 0,
+            step: Step::default(),
             control_mode: ControlMode::Policy,
             run_id: 0,
             model,
@@ -180,6 +193,9 @@ impl DecisionProcess {
         action.curvature_offset = 0.0;
         action.log_evidence = self.log_evidence;
         action.impossible_count = self.impossible_count;
+        action.step_count = self.step_count;
+        action.step_action = self.step.action as u32;
+        action.step_observation = self.step.observation.map_or(u32::MAX, |z| z as u32);
         action.lost_stages = self.losses.lost_stages();
         action.model_hash = self.model.hash();
         action.belief = [0.0; DECISION_STATES];

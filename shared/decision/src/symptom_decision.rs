@@ -1,11 +1,13 @@
 //! Decisions about exceptions of the navigation: symptoms and outcomes are the evidence, and what
 //! the identifier says about the hardware.
 
-use vigil_blocks::{Action, ControlMode, DetectionBelief, FaultBelief, RecoveryKind};
+use vigil_blocks::{
+    Action, ActionOutcome, ControlMode, DetectionBelief, FaultBelief, RecoveryKind,
+};
 use vigil_robot::{Description, FaultTree};
 
 use crate::alarm_fusion::Situation;
-use crate::decision_process::{DecisionProcess, DecisionRule};
+use crate::decision_process::{DecisionProcess, DecisionRule, Step};
 use crate::epoch::{End, Epoch, Limits, SymptomKinds};
 use crate::error::SupervisorError;
 use crate::hardware_belief::HardwareBelief;
@@ -29,7 +31,8 @@ use crate::wheels::Wheels;
 /// start belief mixed in.
 ///
 /// A call for help, or a task given up, stands until a new run or a reset, whatever is believed
-/// meanwhile: a robot that stands looks healthy.
+/// meanwhile: a robot that stands looks healthy. A new run resets the belief, unless its first
+/// frame says that the action succeeded: then that action is the model's step.
 pub(crate) struct SymptomDecision {
     process: DecisionProcess,
     observations: Observations,
@@ -93,11 +96,14 @@ impl SymptomDecision {
             self.process.control_mode = ControlMode::Fallback;
             self.take_alarm(detection, situation);
         }
+        self.gather(detection);
+    }
+
+    /// The epoch goes on; at its end comes a step of the model, and a choice.
+    fn gather(&mut self, detection: &DetectionBelief) {
         let limits = self.limits();
-        let Some(end) = self
-            .epoch
-            .take(detection, self.process.decision_seq, &limits)
-        else {
+        let seq = self.process.decision_seq;
+        let Some(end) = self.epoch.take(detection, seq, &limits) else {
             return;
         };
         let set = self.epoch.take_set(detection.header.t_capture_ns, end);
@@ -184,7 +190,13 @@ impl SymptomDecision {
     fn track(&mut self, set: u32, end: End) {
         let action = self.step_action(end);
         let process = &mut self.process;
-        let evidence = match self.observations.index(set) {
+        let observation = self.observations.index(set);
+        process.step_count += 1;
+        process.step = Step {
+            action,
+            observation,
+        };
+        let evidence = match observation {
             Some(z) => process.tracker.update(&process.model, action, z),
             None => {
                 process.tracker.predict(&process.model, action);
@@ -200,6 +212,24 @@ impl SymptomDecision {
         if run_id != self.process.run_id {
             self.reset();
             self.process.run_id = run_id;
+        }
+    }
+
+    /// A run that begins because the action succeeded: help came, the place was found. It is a step
+    /// of the same task, as what the action mends is in the model. What is known of the hardware is
+    /// of the last run.
+    fn continue_in_run(&mut self, detection: &DetectionBelief) {
+        let is_new = detection.run_id != self.process.run_id;
+        let is_done = detection.action_seq == self.process.decision_seq
+            && detection.action_outcome == ActionOutcome::Succeeded as u32;
+        if is_new && is_done {
+            self.process.run_id = detection.run_id;
+            if let Some(hardware) = &mut self.hardware {
+                hardware.forget();
+            }
+            self.wheels.forget();
+            self.latch.release();
+            self.gather(detection);
         }
     }
 
@@ -226,6 +256,9 @@ impl SymptomDecision {
 
 impl DecisionRule for SymptomDecision {
     fn take(&mut self, inputs: Inputs<'_>, situation: Situation) {
+        if let Some(detection) = inputs.detection {
+            self.continue_in_run(detection);
+        }
         let hardware = self.hardware.as_ref();
         let is_sound = |d: &&FaultBelief| hardware.is_none_or(|h| h.is_sound(d));
         let diagnosis = inputs.diagnosis.filter(is_sound);

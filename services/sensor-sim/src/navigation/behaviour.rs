@@ -13,6 +13,8 @@ use crate::drive::DriveCommand;
 const LOOK_STEP_M: f64 = 0.05;
 /// The same where many ways are looked at: twice as coarse, half the work.
 const SEARCH_STEP_M: f64 = 0.1;
+/// Room that a person leaves about a robot that is set on its path, m.
+const ROOM_M: f64 = 0.2;
 /// Reach of the bumper, m: what is this near stops the robot, whatever its sensors say.
 const BUMPER_M: f64 = 0.08;
 /// Share of the speed in an opening and in moving away.
@@ -178,12 +180,32 @@ impl Navigator {
         distance([x, y], [self.pose[0], self.pose[1]])
     }
 
-    /// True if the robot touches something if it goes on.
+    /// True if the robot runs into something, or farther into it, if it goes on. What it has run
+    /// into does not hold it back.
     pub(super) fn touches(&self, true_pose: [f64; 3], is_forward: bool) -> bool {
         let reach_m = if is_forward { BUMPER_M } else { -BUMPER_M };
-        let (sin, cos) = true_pose[2].sin_cos();
-        let place = [true_pose[0] + reach_m * cos, true_pose[1] + reach_m * sin];
-        !self.map.is_free(place, self.t_s)
+        let [x, y, yaw_rad] = true_pose;
+        let (sin, cos) = yaw_rad.sin_cos();
+        let there_m = self
+            .map
+            .clearance_m([x + reach_m * cos, y + reach_m * sin], self.t_s);
+        there_m < 0.0 && there_m < self.map.clearance_m([x, y], self.t_s)
+    }
+
+    /// Where a person sets a robot that has run into something or is off its path: on the path,
+    /// where there is room. `None` for a robot that stands well.
+    pub(super) fn place_with_room(&self, true_pose: [f64; 3]) -> Option<[f64; 3]> {
+        let here = [true_pose[0], true_pose[1]];
+        let along_m = self.path.nearest(here, 0.0, self.path.length_m());
+        let [x, y, _] = self.path.at(along_m);
+        let clearance_m = |place| self.map.clearance_m(place, self.t_s);
+        if clearance_m(here) >= BUMPER_M && distance([x, y], here) <= NEAR_M {
+            return None;
+        }
+        let left_m = self.path.length_m() - along_m;
+        let steps = 0..=(left_m / SEARCH_STEP_M) as u32;
+        let mut places = steps.map(|step| self.path.at(along_m + f64::from(step) * SEARCH_STEP_M));
+        places.find(|[x, y, _]| clearance_m([*x, *y]) >= ROOM_M)
     }
 
     /// Restarts the plan here; a robot that is off its path first returns to it.

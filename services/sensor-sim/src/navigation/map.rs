@@ -35,11 +35,23 @@ impl Map {
     /// True if the robot's disc touches nothing with its centre at `place`.
     pub(super) fn is_free(&self, place: [f64; 2], t_s: f64) -> bool {
         let wall = |wall: &[f64; 4]| distance_to(wall, place) >= self.body_radius_m;
-        let is_there = |o: &&Obstacle| o.from_s <= t_s && o.until_s.is_none_or(|end_s| t_s < end_s);
         let obstacle =
             |o: &Obstacle| distance([o.x_m, o.y_m], place) >= self.body_radius_m + o.radius_m;
-        self.walls.iter().all(wall)
-            && (self.is_cleared || self.obstacles.iter().filter(is_there).all(obstacle))
+        let mut there = self.obstacles.iter().filter(|it| self.is_there(it, t_s));
+        self.walls.iter().all(wall) && there.all(obstacle)
+    }
+
+    /// Distance of the robot's disc at `place` from what is nearest, m; negative inside it.
+    pub(super) fn clearance_m(&self, place: [f64; 2], t_s: f64) -> f64 {
+        let walls = self.walls.iter().map(|wall| distance_to(wall, place));
+        let there = self.obstacles.iter().filter(|it| self.is_there(it, t_s));
+        let obstacles = there.map(|it| distance([it.x_m, it.y_m], place) - it.radius_m);
+        walls.chain(obstacles).fold(f64::INFINITY, f64::min) - self.body_radius_m
+    }
+
+    fn is_there(&self, obstacle: &Obstacle, t_s: f64) -> bool {
+        let has_left = obstacle.until_s.is_some_and(|end_s| t_s >= end_s);
+        !self.is_cleared && obstacle.from_s <= t_s && !has_left
     }
 
     /// True if the robot's disc at `place` touches the phantom at `phantom`.
@@ -86,6 +98,10 @@ mod tests {
             assert_eq!(map.is_free([2.0, -0.26], t_s), free, "{t_s}");
             assert!(map.is_free([2.0, -0.25], t_s));
         }
+        // Inside the wall by .05 m, and as far from the obstacle as its radius leaves.
+        assert!((map.clearance_m([0.0, 0.8], 0.0) + 0.05).abs() < 1e-12);
+        assert!((map.clearance_m([2.0, -0.2], 1.0) - 0.05).abs() < 1e-12);
+        assert!((map.clearance_m([2.0, -0.2], 3.0) - 0.95).abs() < 1e-12);
         let cleared = Map {
             is_cleared: true,
             ..map

@@ -12,4 +12,4 @@ mod navigator;
 mod path;
 mod task;
 
-pub use navigator::{ActionRequest, DecisionId, Navigator, NavigatorEvent};
+pub use navigator::{ActionRequest, DecisionId, Help, Navigator, NavigatorEvent};

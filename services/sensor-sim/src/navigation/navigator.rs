@@ -31,6 +31,13 @@ pub struct DecisionId {
     pub seq: u64,
 }
 
+/// A person has come: every fault ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Help {
+    /// Where the robot is set, x m, y m, yaw rad; `None` if it stays where it is.
+    pub place: Option<[f64; 3]>,
+}
+
 /// What becomes an event in the timeline.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NavigatorEvent {
@@ -71,8 +78,8 @@ pub struct Navigator {
     /// Something is within the bumper's reach.
     pub(super) touched: bool,
     pub(super) at_goal: bool,
-    /// Help has come and was not reported yet.
-    was_helped: bool,
+    /// Help that has come and was not reported yet.
+    help: Option<Help>,
     /// The robot's pose was corrected and this was not reported yet.
     was_relocalised: bool,
     /// With the next pose the plan restarts where the robot is.
@@ -107,7 +114,7 @@ impl Navigator {
             took_alternative: false,
             touched: false,
             at_goal: false,
-            was_helped: false,
+            help: None,
             was_relocalised: false,
             restarts: false,
             event: None,
@@ -141,7 +148,7 @@ impl Navigator {
                 self.end(true);
             }
         }
-        let command = self.pursue(dt_s, request.speed_scale);
+        let command = self.pursue(dt_s, request.speed_scale, true_pose);
         let hits = match command.speed_m_s {
             forward if forward > 0.0 => self.touched,
             back if back < 0.0 => self.touches(true_pose, false),
@@ -184,9 +191,9 @@ impl Navigator {
         self.touched
     }
 
-    /// True once after help has come: every fault ends.
-    pub fn take_help(&mut self) -> bool {
-        std::mem::take(&mut self.was_helped)
+    /// Help that has come, once.
+    pub const fn take_help(&mut self) -> Option<Help> {
+        self.help.take()
     }
 
     /// True once after the robot's pose was corrected.
@@ -194,7 +201,7 @@ impl Navigator {
         std::mem::take(&mut self.was_relocalised)
     }
 
-    fn pursue(&mut self, dt_s: f64, scale: f64) -> DriveCommand {
+    fn pursue(&mut self, dt_s: f64, scale: f64, true_pose: [f64; 3]) -> DriveCommand {
         let (think_s, help_s) = (self.settings.think_s, self.settings.help_s);
         match &mut self.task {
             Task::Stand => {}
@@ -237,7 +244,9 @@ impl Navigator {
                     self.map.clear();
                     self.faults.repair_sensor();
                     self.relocalise();
-                    self.was_helped = true;
+                    self.help = Some(Help {
+                        place: self.place_with_room(true_pose),
+                    });
                     self.end(true);
                 }
             }

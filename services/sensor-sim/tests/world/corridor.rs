@@ -332,6 +332,30 @@ fn help_clears_the_way_and_begins_a_new_run() {
 }
 
 #[test]
+fn a_robot_at_a_wall_backs_off_or_is_set_on_its_path() {
+    let wrong = trouble(TroubleKind::WrongHeading, 3.0, [0.0, 0.0, 1.2]);
+    let at_the_wall = || {
+        let mut robot = Robot::new(corridor(|c| c.trouble.push(wrong.clone())));
+        assert_eq!(robot.obey(GoOn, 30.0), None);
+        assert!(robot.simulation.touches());
+        robot
+    };
+    let mut backs = at_the_wall();
+    let y_m = backs.place()[1];
+    let (event, _) = backs.obey(MoveAway, 30.0).unwrap();
+    assert_eq!(event, ended(MoveAway, Succeeded));
+    assert!(backs.place()[1] < y_m - 0.1, "{:?}", backs.place());
+
+    let mut helped = at_the_wall();
+    let along_m = helped.place()[0];
+    let (event, _) = helped.obey(CallForHelp, 30.0).unwrap();
+    assert_eq!(event, ended(CallForHelp, Succeeded));
+    let [x, y, yaw_rad] = helped.place();
+    assert!((x - along_m).abs() < 0.2 && y.abs() < 1e-6 && yaw_rad.abs() < 1e-6);
+    assert_eq!(helped.obey(GoOn, 60.0).unwrap().0, NavigatorEvent::Goal);
+}
+
+#[test]
 fn giving_up_and_stopping_stand_and_are_done_at_once() {
     for kind in [Stop, GiveUp] {
         let mut robot = Robot::new(corridor(|_| {}));
