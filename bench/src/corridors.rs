@@ -13,16 +13,18 @@
 mod commander;
 mod drive;
 mod exception;
+mod explorer;
 mod ladder;
 mod layout;
 mod plan;
 mod prices;
+mod recording;
 mod report;
 mod score;
 mod sweep;
 
 pub use commander::CorridorArm;
-pub use drive::{CorridorMission, drive};
+pub use drive::{CorridorMission, drive, record};
 pub use exception::{Exception, Group};
 pub use ladder::EscalationSettings;
 pub use plan::CorridorPlan;

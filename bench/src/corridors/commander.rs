@@ -6,6 +6,7 @@ use vigil_blocks::{Action, ActionOutcome, RecoveryKind, SensorFrame, Symptoms};
 use vigil_evaluation::stages::Stages;
 use vigil_setup::Setup;
 
+use super::explorer::Explorer;
 use super::ladder::{Escalation, EscalationSettings, LadderInput};
 use crate::missions::{Explanations, RuleOutput, action_block};
 use crate::simulated;
@@ -22,6 +23,8 @@ pub enum CorridorArm {
     Ladder(EscalationSettings),
     /// Nobody watches: along the path, whatever happens.
     Without,
+    /// Vigil, but it tries something else in this share of its decisions.
+    Explorer(f64),
 }
 
 impl CorridorArm {
@@ -32,6 +35,7 @@ impl CorridorArm {
             Self::Vigil => "Vigil",
             Self::Ladder(_) => "ladder",
             Self::Without => "without",
+            Self::Explorer(_) => "explorer",
         }
     }
 }
@@ -48,6 +52,7 @@ enum Mind {
     Vigil(Box<Stages>),
     Ladder(Box<Stages>, Escalation),
     Without,
+    Explorer(Box<Stages>, Explorer),
 }
 
 impl<'a> CorridorCommander<'a> {
@@ -62,6 +67,9 @@ impl<'a> CorridorCommander<'a> {
             CorridorArm::Vigil => Mind::Vigil(stages()?),
             CorridorArm::Ladder(settings) => Mind::Ladder(stages()?, Escalation::new(settings)),
             CorridorArm::Without => Mind::Without,
+            CorridorArm::Explorer(share) => {
+                Mind::Explorer(stages()?, Explorer::new(setup, share, seed))
+            }
         };
         Ok(Self {
             setup,
@@ -77,6 +85,12 @@ impl<'a> CorridorCommander<'a> {
             Mind::Vigil(stages) => {
                 stages.take(frame);
                 *self.action = *stages.action();
+                return &self.action;
+            }
+            Mind::Explorer(stages, explorer) => {
+                stages.take(frame);
+                *self.action = *stages.action();
+                explorer.change(&mut self.action, frame);
                 return &self.action;
             }
             Mind::Ladder(stages, ladder) => {

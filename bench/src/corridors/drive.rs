@@ -2,7 +2,8 @@
 
 use std::error::Error;
 
-use vigil_blocks::{RecoveryKind, SensorFrame};
+use vigil_blocks::{Action, RecoveryKind, SensorFrame};
+use vigil_missions::learning::Record;
 use vigil_robot::Injection;
 use vigil_robot::kinematics::wrap_angle;
 use vigil_sensor_sim::{NavigatorEvent, SensorSource, Simulation};
@@ -10,6 +11,7 @@ use vigil_setup::Setup;
 
 use super::commander::{CorridorArm, CorridorCommander};
 use super::plan::CorridorPlan;
+use super::recording::StepRecorder;
 use super::score::{CorridorScore, Step, Tally};
 use super::{CorridorGraph, LIMIT_S};
 use crate::missions::{PresentFault, order};
@@ -32,18 +34,23 @@ pub fn drive(
     plan: &CorridorPlan,
     arms: &[CorridorArm],
 ) -> Result<CorridorMission, Box<dyn Error>> {
-    let mut setup = graph.setup.clone();
-    setup.file.navigation = Some(plan.navigation.clone());
-    setup.file.simulator = plan.simulator.clone();
-    setup.file.graph.seed = plan.seed;
+    let setup = setup_of(graph, plan);
     let scores: Result<_, _> = arms
         .iter()
-        .map(|arm| ride(graph, &setup, plan, *arm))
+        .map(|arm| ride(graph, &setup, plan, *arm, &mut |_, _| {}))
         .collect();
     Ok(CorridorMission {
         plan: plan.clone(),
         scores: scores?,
     })
+}
+
+fn setup_of(graph: &CorridorGraph, plan: &CorridorPlan) -> Setup {
+    let mut setup = graph.setup.clone();
+    setup.file.navigation = Some(plan.navigation.clone());
+    setup.file.simulator = plan.simulator.clone();
+    setup.file.graph.seed = plan.seed;
+    setup
 }
 
 /// The corridor of a mission, and what breaks in it.
@@ -98,12 +105,34 @@ impl<'a> Field<'a> {
     }
 }
 
-/// Drives a mission with one commander.
+/// Drives a mission with a commander that at times tries something else, and records the steps of
+/// the decision model with what was true after each.
+///
+/// # Errors
+/// As [`drive`].
+pub fn record(
+    graph: &CorridorGraph,
+    plan: &CorridorPlan,
+    tried_share: f64,
+) -> Result<Record, Box<dyn Error>> {
+    let setup = setup_of(graph, plan);
+    let range_m = plan.navigation.slow_m;
+    let mut recorder = StepRecorder::new(&graph.setup.decision, range_m);
+    let arm = CorridorArm::Explorer(tried_share);
+    ride(graph, &setup, plan, arm, &mut |field, action| {
+        recorder.take(action, &field.simulation, &field.faults);
+    })?;
+    Ok(recorder.finish())
+}
+
+/// Drives a mission with one commander; `watch` is shown each action block and the world in which
+/// it was decided.
 fn ride(
     graph: &CorridorGraph,
     setup: &Setup,
     plan: &CorridorPlan,
     arm: CorridorArm,
+    watch: &mut dyn FnMut(&Field<'_>, &Action),
 ) -> Result<CorridorScore, Box<dyn Error>> {
     let rate_hz = setup.file.graph.rate_hz;
     let (dt_s, period_ns) = (1.0 / rate_hz, (1e9 / rate_hz).round() as u64);
@@ -117,6 +146,7 @@ fn ride(
         frame.header.seq = k;
         frame.header.t_capture_ns = (k + 1) * period_ns;
         let action = commander.command(&frame, dt_s);
+        watch(&field, action);
         let obeyed = order(action);
         field.break_what_is_due(dt_s)?;
         let before = field.pose();

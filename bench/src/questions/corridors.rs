@@ -3,11 +3,15 @@
 //! Exit: 1 if a bar is missed.
 
 use std::error::Error;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde_json::json;
 use vigil_bench::corridors::{self, CorridorGraph, CorridorPlan, EscalationSettings};
 use vigil_bench::tuning::tune;
+use vigil_missions::learning::file;
 
 use super::{MissionArgs, demand_none, drive_all};
 
@@ -20,6 +24,13 @@ pub struct Args {
     /// Decision model of Vigil instead of that of `config/corridor-people.toml`.
     #[arg(long, value_name = "F")]
     decision: Option<String>,
+    /// Drive Vigil alone, and write the steps of its decision model with their true states to this
+    /// file, for `vigil pomdp fit` and `learn`.
+    #[arg(long, value_name = "F", conflicts_with_all = ["sweep", "json"])]
+    record: Option<PathBuf>,
+    /// Share of the decisions that are recorded in which something else is tried.
+    #[arg(long, value_name = "P", default_value_t = 0.3, requires = "record")]
+    tried: f64,
     #[command(flatten)]
     common: MissionArgs,
 }
@@ -32,6 +43,9 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let graph = CorridorGraph::read(args.common.rate, args.decision.as_deref())?;
     let shipped = graph.setup.file.navigation.clone().unwrap_or_default();
     let plans = CorridorPlan::many(&shipped, args.missions, args.common.first_seed());
+    if let Some(path) = &args.record {
+        return record(args, &graph, &plans, path);
+    }
     match args.common.sweep {
         true => sweep(args, &graph, &plans),
         false => measure(args, &graph, &plans),
@@ -51,6 +65,25 @@ fn measure(
     let common = &args.common;
     common.keep("corridors", document, began, Some(lines), say)?;
     demand_none(&corridors::shortfalls(&arms, &missions))
+}
+
+fn record(
+    args: &Args,
+    graph: &CorridorGraph,
+    plans: &[CorridorPlan],
+    path: &Path,
+) -> Result<(), Box<dyn Error>> {
+    let records = drive_all(plans, |plan| corridors::record(graph, plan, args.tried))?;
+    let mut out = BufWriter::new(File::create(path)?);
+    let policy = format!(
+        "{}, {} tried",
+        graph.setup.file.supervisor.policy, args.tried
+    );
+    file::write_head(&mut out, policy)?;
+    for record in &records {
+        file::write(&mut out, &graph.setup.decision, record)?;
+    }
+    Ok(out.flush()?)
 }
 
 fn sweep(args: &Args, graph: &CorridorGraph, plans: &[CorridorPlan]) -> Result<(), Box<dyn Error>> {

@@ -25,7 +25,7 @@ pub use check::WorldError;
 pub use drive::{ACCELERATION_MAX_M_S2, CURVATURE_RATE_MAX_1_M_S, DriveCommand};
 pub use encoders::{NOISE_MAX_RAD_S, NOISE_MIN_RAD_S};
 pub use injection_schedule::InjectionSchedule;
-pub use navigation::{Help, Navigator, NavigatorEvent};
+pub use navigation::{Help, NavigationCondition, Navigator, NavigatorEvent, WayAhead};
 pub use playback::{Playback, PlaybackError};
 pub use simulation::Simulation;
 pub use wiring::{

@@ -5,7 +5,9 @@ use vigil_robot::injection::Change;
 
 use crate::action_gate::{self, ActionGate, EffectiveCommand};
 use crate::check::WorldError;
-use crate::navigation::{ActionRequest, DecisionId, Navigator, NavigatorEvent};
+use crate::navigation::{
+    ActionRequest, DecisionId, NavigationCondition, Navigator, NavigatorEvent,
+};
 use crate::world::World;
 
 /// A simulated rover that drives its segments or, with a navigator, its path.
@@ -77,6 +79,16 @@ impl Simulation {
     /// [`WorldError`] naming what does not exist or is out of range.
     pub fn change(&mut self, change: Change) -> Result<(), WorldError> {
         self.world.change(change)
+    }
+
+    /// What is truly wrong with the navigation, of the way up to `range_m` ahead; `None` without
+    /// one.
+    #[must_use]
+    pub fn navigation_condition(&self, range_m: f64) -> Option<NavigationCondition> {
+        let pose = self.world.true_state().pose;
+        self.navigator
+            .as_ref()
+            .map(|it| it.condition(pose, range_m))
     }
 
     /// True if the navigation has something within its bumper's reach.

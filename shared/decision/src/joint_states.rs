@@ -75,6 +75,11 @@ impl JointStates {
         }))
     }
 
+    /// Of each state of the model, which of the hardware it is.
+    pub(crate) fn hardware_of_states(&self) -> &[usize] {
+        &self.of_state
+    }
+
     /// What `belief` says about the hardware.
     pub(crate) fn write_hardware(&self, belief: &[f64], hardware: &mut [f64]) {
         hardware.fill(0.0);

@@ -10,6 +10,7 @@ use crate::error::SupervisorError;
 use crate::fault_decision::FaultDecision;
 use crate::inputs::Inputs;
 use crate::mapping::Compensation;
+use crate::policy;
 use crate::settings::{self, Settings};
 use crate::symptom_decision::SymptomDecision;
 
@@ -39,6 +40,12 @@ impl Supervisor {
         compensation: Vec<Compensation>,
         blind_after_misses: u32,
     ) -> Result<Self, SupervisorError> {
+        let by_symptoms = matches!(settings.evidence, settings::Evidence::Symptoms);
+        let shown = solved
+            .filter(|_| by_symptoms)
+            .map(|solved| policy::with_identifier(solved, &model, tree, settings))
+            .transpose()?;
+        let solved = shown.as_ref().or(solved);
         let process = DecisionProcess::new(model, solved, settings, blind_after_misses)?;
         let rule: Box<dyn DecisionRule> = match settings.evidence {
             settings::Evidence::Faults => {

@@ -190,6 +190,12 @@ impl SymptomDecision {
     fn track(&mut self, set: u32, end: End) {
         let action = self.step_action(end);
         let process = &mut self.process;
+        // Nothing was seen of an action that was not done: no news.
+        if set == 0 && action != process.choice.action {
+            process.tracker.predict(&process.model, action);
+            self.take_over(0.0);
+            return;
+        }
         let observation = self.observations.index(set);
         process.step_count += 1;
         process.step = Step {

@@ -12,20 +12,23 @@ use crate::drive::DriveCommand;
 /// Step in which the way ahead is looked at, m.
 const LOOK_STEP_M: f64 = 0.05;
 /// The same where many ways are looked at: twice as coarse, half the work.
-const SEARCH_STEP_M: f64 = 0.1;
+pub(super) const SEARCH_STEP_M: f64 = 0.1;
+/// A way that was blocked counts as free after this long, s. A shorter time has the plan begin anew
+/// with every flicker of the range sensor.
+const FREE_S: f64 = 1.0;
 /// Room that a person leaves about a robot that is set on its path, m.
 const ROOM_M: f64 = 0.2;
 /// Reach of the bumper, m: what is this near stops the robot, whatever its sensors say.
-const BUMPER_M: f64 = 0.08;
+pub(super) const BUMPER_M: f64 = 0.08;
 /// Share of the speed in an opening and in moving away.
 const CAREFUL: f64 = 0.75;
 /// Below this share of the speed the robot stands: it would creep for seconds before `stop_m`. With
 /// a larger share it stands farther from the obstacle.
 const CREEP: f64 = 0.05;
 /// Steps of 0.1 m to either side in which an opening is looked for.
-const SIDE_STEPS: i32 = 20;
+pub(super) const SIDE_STEPS: i32 = 20;
 /// Free way that an opening must offer beyond what blocks, m.
-const BEYOND_M: f64 = 0.6;
+pub(super) const BEYOND_M: f64 = 0.6;
 /// A robot farther from its lane than this, m, is neither at its goal nor past an opening.
 const NEAR_M: f64 = 0.4;
 /// The robot is at its goal within this distance along the path, m.
@@ -55,9 +58,15 @@ impl Navigator {
         };
         if free_m < slow_m {
             self.block_m = Some(self.along_m + free_m);
-        } else if self.block_m.take().is_some() {
-            // The way is free again: the plan goes on from here.
-            self.planned_m = self.along_m;
+            self.free_s = 0.0;
+        } else if self.block_m.is_some() {
+            // A way that flickers is not free.
+            self.free_s += dt_s;
+            if self.free_s >= FREE_S {
+                // The way is free again: the plan goes on from here.
+                self.block_m = None;
+                self.planned_m = self.along_m;
+            }
         }
         let length_m = self.path.length_m();
         let step_m = self.settings.speed_m_s * scale * dt_s;
@@ -242,7 +251,7 @@ impl Navigator {
     }
 
     /// True if the range sensor sees the robot touch a phantom at `place`.
-    fn is_phantom(&self, place: [f64; 2]) -> bool {
+    pub(super) fn is_phantom(&self, place: [f64; 2]) -> bool {
         let phantom = self.faults.phantom;
         phantom.is_some_and(|at| self.map.touches_phantom(at, place))
     }
@@ -259,7 +268,7 @@ impl Navigator {
 
     /// The lane nearest to the path on which the way is free up to `end_m`, as a close look tells,
     /// and where it has passed.
-    fn opening(&self, end_m: f64) -> Option<(Lane, f64)> {
+    pub(super) fn opening(&self, end_m: f64) -> Option<(Lane, f64)> {
         let sides = (0..=SIDE_STEPS).flat_map(|side| [side, -side]);
         sides.into_iter().find_map(|side| {
             let left_m = f64::from(side) * SEARCH_STEP_M;

@@ -86,6 +86,11 @@ impl NavigationFaults {
         })
     }
 
+    /// True if the believed pose is wrong.
+    pub(super) const fn is_lost(&self) -> bool {
+        self.offset.is_some()
+    }
+
     /// Corrects pose and heading; true if the believed pose jumps.
     pub(super) const fn relocalise(&mut self) -> bool {
         self.wrong_heading_rad = 0.0;

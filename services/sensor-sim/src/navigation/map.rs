@@ -49,6 +49,12 @@ impl Map {
         walls.chain(obstacles).fold(f64::INFINITY, f64::min) - self.body_radius_m
     }
 
+    /// True if something is there that leaves by itself.
+    pub(super) fn is_crowded(&self, t_s: f64) -> bool {
+        let leaves = |it: &Obstacle| it.until_s.is_some() && self.is_there(it, t_s);
+        self.obstacles.iter().any(leaves)
+    }
+
     fn is_there(&self, obstacle: &Obstacle, t_s: f64) -> bool {
         let has_left = obstacle.until_s.is_some_and(|end_s| t_s >= end_s);
         !self.is_cleared && obstacle.from_s <= t_s && !has_left

@@ -5,6 +5,7 @@
 //! and noise act on it as on any drive.
 
 mod behaviour;
+mod condition;
 mod faults;
 mod lane;
 mod map;
@@ -12,4 +13,5 @@ mod navigator;
 mod path;
 mod task;
 
+pub use condition::{NavigationCondition, WayAhead};
 pub use navigator::{ActionRequest, DecisionId, Help, Navigator, NavigatorEvent};

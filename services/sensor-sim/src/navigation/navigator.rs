@@ -67,6 +67,8 @@ pub struct Navigator {
     pub(super) planned_m: f64,
     /// Distance along the path of what blocked it last, m.
     pub(super) block_m: Option<f64>,
+    /// How long the way has been free since, s.
+    pub(super) free_s: f64,
     pub(super) task: Task,
     kind: RecoveryKind,
     decision: DecisionId,
@@ -104,6 +106,7 @@ impl Navigator {
             curvature_1_m: 0.0,
             planned_m: 0.0,
             block_m: None,
+            free_s: 0.0,
             task: Task::Stand,
             kind: RecoveryKind::None,
             decision: DecisionId::default(),

@@ -2,7 +2,7 @@
 
 use vigil_blocks::{Action, ActionOutcome, RecoveryKind, SensorFrame, Symptoms};
 use vigil_robot::ChannelMap;
-use vigil_sensor_sim::{ActionGate, Navigator, NavigatorEvent, Simulation, World};
+use vigil_sensor_sim::{ActionGate, Navigator, NavigatorEvent, Simulation, WayAhead, World};
 use vigil_setup::graph_file::{Navigation, Obstacle, Trouble, TroubleKind};
 
 /// A straight corridor of 8 m, 2.4 m wide, changed.
@@ -329,6 +329,62 @@ fn help_clears_the_way_and_begins_a_new_run() {
     assert_ne!(robot.frame.run_id, run);
     robot.settings.obstacle.clear();
     assert_eq!(robot.obey(GoOn, 60.0).unwrap().0, NavigatorEvent::Goal);
+}
+
+#[test]
+fn what_is_wrong_with_the_navigation_is_told() {
+    let way = |change: fn(&mut Navigation), seconds: f64| {
+        let mut robot = Robot::new(corridor(change));
+        robot.obey(GoOn, seconds);
+        robot.simulation.navigation_condition(2.5).unwrap().way
+    };
+    assert_eq!(way(|_| {}, 10.0), WayAhead::Free);
+    assert_eq!(
+        way(|c| c.obstacle.push(obstacle(6.0, 0.0, 1.2)), 1.0),
+        WayAhead::Free
+    );
+    assert_eq!(
+        way(|c| c.obstacle.push(obstacle(4.0, 0.0, 1.2)), 30.0),
+        WayAhead::Filled
+    );
+    let leaves = |c: &mut Navigation| {
+        let until_s = Some(60.0);
+        c.obstacle.push(Obstacle {
+            until_s,
+            ..obstacle(4.0, 0.0, 1.2)
+        });
+    };
+    assert_eq!(way(leaves, 30.0), WayAhead::Crowded);
+    // Past this there is a way, but not from so near that the robot cannot turn to it.
+    let aside = |c: &mut Navigation| c.obstacle.push(obstacle(4.0, -0.9, 0.6));
+    assert_eq!(way(aside, 9.0), WayAhead::Passable);
+    let near = |c: &mut Navigation| {
+        (c.stop_m, c.slow_m) = (0.2, 0.5);
+        c.obstacle.push(obstacle(4.0, -0.9, 0.6));
+    };
+    assert_eq!(way(near, 60.0), WayAhead::TooNear);
+
+    let mut robot = Robot::new(corridor(|c| {
+        c.trouble = vec![
+            trouble(TroubleKind::Mislocalised, 1.0, [0.5, 0.0, 0.0]),
+            trouble(TroubleKind::WrongHeading, 2.0, [0.0, 0.0, 0.4]),
+        ];
+    }));
+    let said = |robot: &Robot| {
+        let condition = robot.simulation.navigation_condition(2.5).unwrap();
+        (
+            condition.is_lost,
+            condition.heads_wrong,
+            condition.has_other_way,
+        )
+    };
+    assert_eq!(said(&robot), (false, false, false));
+    robot.obey(GoOn, 1.5);
+    assert_eq!(said(&robot), (true, false, false));
+    robot.obey(GoOn, 1.0);
+    assert_eq!(said(&robot), (true, true, false));
+    robot.obey(Relocalise, 5.0);
+    assert_eq!(said(&robot), (false, false, false));
 }
 
 #[test]

@@ -185,11 +185,11 @@ fn files_that_do_not_fit_are_refused_with_line_key_and_reason() {
     assert!(cut.contains("policy.json: line 1, column"), "{cut}");
     let model = model("rover.pomdp");
     let states = model.states().len();
-    let many = (0..2600).map(|i| (i % model.actions().len(), vec![-1.0; states]));
+    let many = (0..5200).map(|i| (i % model.actions().len(), vec![-1.0; states]));
     let many = AlphaVectors::new(states, model.actions().len(), many).unwrap();
     let many = refused(&file(&model, -1.0, many));
     assert!(
-        many.contains("multiplications, allowed are 20000"),
+        many.contains("multiplications, allowed are 40000"),
         "{many}"
     );
     let missing = load("rover.toml", &folder.path().join("none"))

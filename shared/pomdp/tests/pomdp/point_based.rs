@@ -146,3 +146,35 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn an_action_that_shows_a_part_of_the_state_is_answered_part_by_part() {
+    // Two parts of two states; action 0 is worth most in the first part, by one plan or another.
+    let vectors = [
+        (0, vec![4.0, 4.0, -9.0, -9.0]),
+        (0, vec![-9.0, -9.0, 3.0, 1.0]),
+        (1, vec![1.0, 1.0, 1.0, 1.0]),
+    ];
+    let text = "discount: 0.5\nvalues: reward\nstates: 4\nactions: 2\nobservations: 1\n\
+                T: * identity\nO: * uniform\nR: * : * : * : * -20\n";
+    let model = Pomdp::parse(text).unwrap();
+    let vectors = AlphaVectors::new(4, 2, vectors).unwrap();
+    let belief = [0.25, 0.25, 0.25, 0.25];
+    let mut values = [0.0; 2];
+    let mut plain = PointBased::new(&model, &vectors).unwrap();
+    assert_eq!(plain.evaluate(&belief, &mut values).action, 1);
+    assert_eq!(values, [-2.5, 1.0]);
+    let part_of = [0, 0, 1, 1];
+    let mut shown = plain.clone().shown(&part_of, &[true, false]);
+    assert_eq!(shown.evaluate(&belief, &mut values).action, 0);
+    assert_eq!(values, [3.0, 1.0], "0.5 * 4 + 0.25 * 3 + 0.25 * 1");
+    // A robot that stands is shown nothing; where the part is known there is nothing to show.
+    let mut standing = plain.clone().shown(&part_of, &[false, false]);
+    standing.evaluate(&belief, &mut values);
+    assert_eq!(values, [-2.5, 1.0]);
+    let known = [0.5, 0.5, 0.0, 0.0];
+    shown.evaluate(&known, &mut values);
+    let of_shown = values;
+    plain.evaluate(&known, &mut values);
+    assert_eq!(values, of_shown);
+}

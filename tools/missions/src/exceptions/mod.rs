@@ -7,11 +7,13 @@
 //! - Exceptions of one kind exclude each other; those of different kinds come and go independently.
 //! - What is wrong is a set, and its state is named by its members, joined by `-`.
 //! - Symptoms are independent given the exceptions; each shows its own (noisy-or). What an action
-//!   remedies shows nothing while it lasts.
+//!   remedies shows nothing while it lasts; of the others an action may show a share.
 
+mod fit;
 mod parameters;
 mod process;
 
+pub use fit::{Fit, FittedChance, fit};
 pub use parameters::{Action, Exception, ParameterError, Parameters, Signs};
 pub use process::{ExceptionProcess, NOMINAL};
 

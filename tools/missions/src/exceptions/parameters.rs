@@ -1,16 +1,20 @@
 //! The parameter file of a model of exceptions.
 
 use std::collections::BTreeMap;
+use std::ops::Bound;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::parameter_number::{self, NumberError, out_of_range};
 
 /// What the sum of chances may be off: many chances are added up.
 const SUM_ROUNDING: f64 = 1e-9;
 
+/// Longest action, in steps.
+const LASTS_MAX: f64 = 100.0;
+
 /// Everything that the model is made from.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
     /// What the file is for: `exceptions`.
@@ -19,6 +23,10 @@ pub struct Parameters {
     pub discount: f64,
     /// So many exceptions at once, 1 or more; what would arise besides does not.
     pub at_once_max: usize,
+    /// How long a task takes a robot of which nothing is wrong, in steps, 1 or more: then the next
+    /// begins as the first did, with a robot that was mended. Without it a task has no end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub task_steps: Option<f64>,
     /// Symptoms; those of one list exclude each other.
     pub symptoms: Vec<Vec<String>>,
     /// What a robot shows of which nothing is wrong.
@@ -32,7 +40,7 @@ pub struct Parameters {
 }
 
 /// What is seen, each with its chance per step.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Signs {
     /// Symptoms, whatever is done.
@@ -42,7 +50,7 @@ pub struct Signs {
 }
 
 /// An action.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Action {
     /// Its name.
@@ -50,6 +58,13 @@ pub struct Action {
     /// Share of the speed at which it moves the robot, 0 to 1.
     #[serde(default)]
     pub speed_scale: f64,
+    /// How long it lasts, in steps, above 0: so much longer things have time to arise and to pass.
+    #[serde(default = "all")]
+    pub lasts: f64,
+    /// Share of its symptoms that an exception shows while the action lasts, 0 to 1. A robot that
+    /// stands for a second shows little of a wrong heading.
+    #[serde(default = "all")]
+    pub shows: f64,
     /// What it costs, from 0.
     #[serde(default)]
     pub price: f64,
@@ -70,8 +85,12 @@ pub struct Action {
     pub ends: bool,
 }
 
+const fn all() -> f64 {
+    1.0
+}
+
 /// An exception. Those of one kind exclude each other.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Exception {
     /// Its name. Of hardware, a name that the fault tree gives, or `UNKNOWN` and the like.
@@ -138,6 +157,9 @@ impl Parameters {
         if self.at_once_max == 0 {
             return Err(ParameterError::Missing("at_once_max of 1 or more"));
         }
+        if let Some(steps) = self.task_steps {
+            range("task_steps", steps, 1.0..f64::INFINITY, "any number from 1")?;
+        }
         if !self.actions.iter().any(|action| action.follows) {
             return Err(ParameterError::Missing("an action that follows the path"));
         }
@@ -176,6 +198,10 @@ impl Parameters {
     fn check_action(&self, action: &Action) -> Result<(), ParameterError> {
         let key = |of: &str| format!("action {}: {of}", action.name);
         range(&key("speed_scale"), action.speed_scale, 0.0..=1.0, "0 to 1")?;
+        let lasts = action.lasts;
+        let above = (Bound::Excluded(0.0), Bound::Included(LASTS_MAX));
+        range(&key("lasts"), lasts, above, "above 0, at most 100")?;
+        range(&key("shows"), action.shows, 0.0..=1.0, "0 to 1")?;
         range(
             &key("price"),
             action.price,

@@ -71,12 +71,20 @@ impl<'a> ExceptionProcess<'a> {
             let of_kind = exceptions.filter(|(_, e)| e.kind == kind);
             let mut next: Vec<_> = of_kind.map(|(i, e)| (Some(i), e.arises)).collect();
             let arises: f64 = next.iter().map(|(_, p)| p).sum();
-            next.push((None, 1.0 - arises));
+            // Nothing arises in so many steps, or in a part of one.
+            let quiet = (1.0 - arises).powf(action.lasts);
+            let share = if arises > 0.0 {
+                (1.0 - quiet) / arises
+            } else {
+                0.0
+            };
+            next.iter_mut().for_each(|(_, p)| *p *= share);
+            next.push((None, quiet));
             return next;
         };
         let exception = self.exception(number);
         let mended = exception.mended.get(&action.name).copied().unwrap_or(0.0);
-        let stays = (1.0 - mended) * (1.0 - exception.passes);
+        let stays = (1.0 - mended) * (1.0 - exception.passes).powf(action.lasts);
         let mut next = vec![(None, 1.0 - stays)];
         let mut rest = 1.0;
         for (name, p) in exception.turns.get(&action.name).into_iter().flatten() {
@@ -115,6 +123,15 @@ impl<'a> ExceptionProcess<'a> {
         next.into_iter().filter_map(known).collect()
     }
 
+    /// Chance that the task is done: in the share of it that the action drives, if it does.
+    fn ends(&self, set: &Set, action: &Action) -> f64 {
+        let drives = action.follows && members(set).all(|i| self.exception(i).follow.is_none());
+        match self.parameters.task_steps {
+            Some(steps) if drives => (action.speed_scale / steps).min(1.0),
+            _ => 0.0,
+        }
+    }
+
     /// The signs of what is wrong and not remedied by the action; of several in the file's order.
     fn signs(&self, set: &Set, action: &Action) -> Vec<&'a Signs> {
         let open = members(set).filter(|number| !remedies(action, self.exception(*number)));
@@ -122,8 +139,11 @@ impl<'a> ExceptionProcess<'a> {
     }
 
     /// Chance of `name` among symptoms that exclude each other; `None` of none of them.
-    fn symptom(&self, group: &[String], name: Option<&str>, signs: &[&Signs]) -> f64 {
-        let of = |signs: &Signs, name: &str| signs.symptoms.get(name).copied().unwrap_or(0.0);
+    fn symptom(&self, group: &[String], name: Option<&str>, signs: &[&Signs], shows: f64) -> f64 {
+        let of = |signs: &Signs, name: &str| {
+            let p = signs.symptoms.get(name).copied().unwrap_or(0.0);
+            shows * p
+        };
         let any = |signs: &Signs| group.iter().map(|name| of(signs, name)).sum::<f64>();
         let nominal = [&self.parameters.nominal];
         let signs = if signs.is_empty() { &nominal } else { signs };
@@ -200,10 +220,16 @@ impl Process for ExceptionProcess<'_> {
 
     fn transition(&self, state: usize, action: usize) -> Vec<(usize, f64)> {
         let action = self.action(action);
-        match action.ends {
-            true => self.start(),
-            false => self.next(&self.sets[state], action),
+        if action.ends {
+            return self.start();
         }
+        let ends = self.ends(&self.sets[state], action);
+        let next = self.next(&self.sets[state], action).into_iter();
+        let begins = self.start().into_iter().filter(|_| ends > 0.0);
+        let goes_on = next.map(|(state, p)| (state, (1.0 - ends) * p));
+        goes_on
+            .chain(begins.map(|(state, p)| (state, ends * p)))
+            .collect()
     }
 
     fn observation(&self, action: usize, next: usize) -> Vec<(usize, f64)> {
@@ -216,7 +242,7 @@ impl Process for ExceptionProcess<'_> {
             };
             let symptoms = self.parameters.symptoms.iter();
             let symptoms: f64 = symptoms
-                .map(|group| self.symptom(group, within(group), &signs))
+                .map(|group| self.symptom(group, within(group), &signs, action.shows))
                 .product();
             let is_symptom = |name: &&&str| {
                 self.parameters

@@ -21,6 +21,7 @@
 
 pub mod check;
 mod expectation;
+pub mod file;
 mod information;
 mod layout;
 mod learned;

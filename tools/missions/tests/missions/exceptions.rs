@@ -1,6 +1,7 @@
 //! The model of exceptions of navigation and hardware: what follows from its parameters.
 
-use vigil_missions::exceptions::{ParameterError, Parameters, generate};
+use vigil_missions::exceptions::{ParameterError, Parameters, fit, generate};
+use vigil_missions::learning::Record;
 use vigil_pomdp::Pomdp;
 
 const SHIPPED: &str = include_str!("../../../../config/corridor.recovery.toml");
@@ -145,6 +146,100 @@ fn kinds_come_and_go_independently() {
     assert_near(one.t("NNP", "FP", "NNP"), 0.9);
     assert_near(one.t("NNP", "FP", "NOM"), 0.09);
     assert_near(one.t("NNP", "FP", "STUCK"), 0.01);
+}
+
+#[test]
+fn what_lasts_a_part_of_a_step_gives_a_part_of_its_time_and_of_its_signs() {
+    let text = SMALL.replace("price = 0.5\n", "price = 0.5\nlasts = 0.5\nshows = 0.5\n");
+    let short = Named(model(&text).unwrap());
+    // Nothing of two kinds arises in half a step: the roots of 0.8 and of 0.9.
+    assert_near(short.t("NOM", "GO", "NOM"), (0.8 * 0.9_f64).sqrt());
+    assert_near(short.t("NOM", "FP", "NOM"), 0.8 * 0.9);
+    let stays = 0.5 * 0.9_f64.sqrt();
+    assert_near(short.t("NNP-STUCK", "GO", "NNP-STUCK"), stays * 0.75);
+    assert_near(short.t("NNP-STUCK", "GO", "DE-STUCK"), stays * 0.25);
+    assert_near(short.o("GO", "NNP", "EPS"), 0.5 * 0.2 * 0.95);
+    assert_near(short.o("FP", "NNP", "EPS"), 0.2);
+    for wrong in ["lasts = 0.0", "lasts = 101.0", "shows = 1.5"] {
+        let text = SMALL.replace("price = 0.5\n", &format!("price = 0.5\n{wrong}\n"));
+        assert!(model(&text).is_err(), "{wrong}");
+    }
+}
+
+#[test]
+fn a_task_ends_where_the_robot_follows_its_path_and_the_next_begins() {
+    let text = SMALL.replace("discount = 0.9", "discount = 0.9\ntask_steps = 4.0");
+    let short = Named(model(&text).unwrap());
+    // A quarter of the tasks end; the next begins with what may just have arisen.
+    assert_near(short.t("STUCK", "FP", "STUCK"), 0.75 * 0.8 + 0.25 * 0.08);
+    assert_near(short.t("STUCK", "FP", "NOM"), 0.25 * 0.72);
+    assert_near(short.t("STUCK", "CP", "NOM"), 0.125 * 0.72);
+    // Nobody drives before what blocks the way, nor while looking.
+    assert_near(short.t("NNP", "FP", "NNP"), 0.9 * 0.9);
+    assert_near(short.t("STUCK", "GO", "NOM"), 0.0);
+    let wrong = SMALL.replace("discount = 0.9", "discount = 0.9\ntask_steps = 0.5");
+    assert!(model(&wrong).is_err());
+}
+
+#[test]
+fn chances_are_counted_where_states_are_known() {
+    let parameters: Parameters = toml::from_str(SMALL).unwrap();
+    let small = Named::small();
+    let of = |names: &[String], name: &str| Named::index(names, name) as u32;
+    let record = |steps: &[(&str, &str)], states: &[Option<&str>]| Record {
+        actions: steps.iter().map(|s| of(small.0.actions(), s.0)).collect(),
+        observations: steps
+            .iter()
+            .map(|s| of(small.0.observations(), s.1))
+            .collect(),
+        rewards: Vec::new(),
+        labels: states
+            .iter()
+            .map(|s| s.map(|s| of(small.0.states(), s)))
+            .collect(),
+    };
+    let records = [
+        // A blocked way arises in one of four steps; it is mended in one of two looks, and found
+        // without another way in the other.
+        record(
+            &[("FP", "none"), ("FP", "EPM"), ("GO", "BO")],
+            &[Some("NOM"), Some("NOM"), Some("NNP"), Some("NOM")],
+        ),
+        record(
+            &[("FP", "none"), ("FP", "none"), ("GO", "none")],
+            &[Some("NOM"), Some("NOM"), None, Some("NOM")],
+        ),
+        record(
+            &[("FP", "none"), ("GO", "EPS")],
+            &[Some("NOM"), Some("NNP"), Some("DE")],
+        ),
+    ];
+    let chance = |weight: f64, key: &str| {
+        let found = fit(&parameters, &small.0, &records, weight);
+        let chance = found.chances.iter().find(|chance| chance.key == key);
+        chance.map(|chance| (chance.count, chance.visits, chance.fitted))
+    };
+    assert_eq!(fit(&parameters, &small.0, &records, 1.0).steps, 6);
+    assert_eq!(chance(0.0, "NNP: arises"), Some((2.0, 4.0, 0.5)));
+    // By hand 0.2, worth six visits.
+    assert_eq!(
+        chance(6.0, "NNP: arises"),
+        Some((2.0, 4.0, (2.0 + 1.2) / 10.0))
+    );
+    // One of two is gone; of the 1.8 that did not pass by themselves 0.8 were mended.
+    let (k, n, p) = chance(0.0, "NNP: mended by GO").unwrap();
+    assert_near(k, 0.8);
+    assert_near(n, 1.8);
+    assert_near(p, 0.8 / 1.8);
+    assert_eq!(
+        chance(0.0, "NNP: turned into DE by GO"),
+        Some((1.0, 1.0, 1.0))
+    );
+    assert_eq!(chance(0.0, "nominal: outcome BO"), Some((1.0, 1.0, 1.0)));
+    assert_eq!(chance(0.0, "NNP: symptom EPM"), Some((1.0, 2.0, 0.5)));
+    // What is ruled out stays so, and what was never visited too.
+    assert_eq!(chance(0.0, "DE: arises"), None);
+    assert_eq!(chance(0.0, "STUCK: symptom LD"), None);
 }
 
 #[test]

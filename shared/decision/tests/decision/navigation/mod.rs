@@ -3,7 +3,8 @@
 use vigil_blocks::{Action, ActionOutcome, DetectionBelief, Entry, FaultBelief, RecoveryKind};
 use vigil_cycle::allocation::allocations;
 use vigil_decision::{Compensation, Inputs, Settings, Supervisor};
-use vigil_pomdp::{Pomdp, Tracker};
+use vigil_pomdp::policy_file::PolicyFile;
+use vigil_pomdp::{PointBased, Pomdp, Tracker};
 use vigil_robot::FaultTree;
 use vigil_setup::graph_file::GraphFile;
 
@@ -30,13 +31,12 @@ pub fn by_the_papers_model(file: &mut GraphFile) {
         .actions
         .retain(|name, _| paper.contains(&name.as_str()));
     file.supervisor.lost_state = None;
+    (file.supervisor.policy, file.supervisor.policy_file) = ("qmdp".to_owned(), None);
 }
 
-/// As shipped, but by Q-MDP.
+/// As shipped.
 pub fn joint_settings() -> Settings {
-    let mut settings = toml::from_str::<GraphFile>(GRAPH).unwrap().supervisor;
-    (settings.policy, settings.policy_file) = ("qmdp".to_owned(), None);
-    settings
+    toml::from_str::<GraphFile>(GRAPH).unwrap().supervisor
 }
 
 pub fn tree() -> FaultTree {
@@ -48,13 +48,19 @@ pub fn build(model: &str, settings: &Settings) -> Result<Supervisor, String> {
     let config = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
     let robot = vigil_setup::load_robot(&config.join("robots/rover.toml")).unwrap();
     let model = Pomdp::parse(model).unwrap();
+    let solved = settings.policy_file.as_ref().map(|name| {
+        let bytes = std::fs::read(config.join(name)).unwrap();
+        let file = PolicyFile::read(&bytes, &model).unwrap();
+        PointBased::new(&model, &file.vectors).unwrap()
+    });
     let compensation = (0..6).map(|wheel| Compensation {
         wheel,
         curvature_gain: 1.0,
         curvature_offset_1_m: 0.1 * wheel as f64,
     });
     let compensation = compensation.collect();
-    Supervisor::new(model, None, &tree(), &robot, settings, compensation, 10)
+    let solved = solved.as_ref();
+    Supervisor::new(model, solved, &tree(), &robot, settings, compensation, 10)
         .map_err(|e| e.to_string())
 }
 

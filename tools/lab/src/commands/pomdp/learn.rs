@@ -5,7 +5,7 @@ mod document;
 use std::path::PathBuf;
 
 use vigil_missions::learning::check::{Agreement, Refusal, RewardCheck};
-use vigil_missions::learning::{LearnedModel, Record, Settings, check, learn};
+use vigil_missions::learning::{LearnedModel, Record, Settings, check, file, learn};
 use vigil_missions::simulation::{
     Episode, PairedDifference, PolicyAgent, Rules, Summary, run as fly,
 };
@@ -13,7 +13,7 @@ use vigil_pomdp::policy::{Dual, PolicyName};
 use vigil_pomdp::{Pomdp, mdp};
 
 use super::compare::{count, fits};
-use super::{load, missions, print, save, seed};
+use super::{load, print, save, seed};
 use document::{Document, Mean};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
@@ -76,7 +76,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     if let Some(world) = &world {
         fits("--world", &prior, world)?;
     }
-    let flown = missions::read(&args.missions, &prior)?;
+    let flown = file::read(&args.missions, &prior).map_err(CommandError::usage)?;
     let learned = learned(args, &prior, &flown.records)?;
     let Worths {
         predicted,

@@ -3,10 +3,10 @@
 mod compare;
 mod convert;
 mod escalation;
+mod fit;
 mod generate;
 mod info;
 mod learn;
-mod missions;
 mod picture;
 mod planner;
 mod seed;
@@ -33,6 +33,7 @@ pub struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     Compare(Box<compare::Args>),
+    Fit(fit::Args),
     Generate(generate::Args),
     Info(info::Args),
     Learn(learn::Args),
@@ -51,6 +52,7 @@ enum Command {
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     match &args.command {
         Command::Compare(args) => compare::run(args),
+        Command::Fit(args) => fit::run(args),
         Command::Generate(args) => generate::run(args),
         Command::Info(args) => info::run(args),
         Command::Learn(args) => learn::run(args),
@@ -117,19 +119,4 @@ fn load(path: &Path) -> Result<Pomdp, CommandError> {
         Pomdp::parse(&text)
     };
     model.map_err(|e| wrong(&e))
-}
-
-/// The index of a name, or of an index.
-fn find(names: &[String], word: &str, what: &str) -> Result<usize, String> {
-    let by_name = names.iter().position(|name| name == word);
-    let index = by_name.or_else(|| word.parse().ok().filter(|i| *i < names.len()));
-    index.ok_or_else(|| {
-        const SHOWN: usize = 12;
-        let more = if names.len() > SHOWN { " ..." } else { "" };
-        let some = names[..names.len().min(SHOWN)].join(" ");
-        format!(
-            "'{word}' is no {what}, allowed are {some}{more}, or 0 to {}",
-            names.len() - 1
-        )
-    })
 }

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
-use vigil_missions::learning::Record;
+use vigil_missions::learning::{Record, file};
 use vigil_missions::simulation::{Episode, Rules, horizon};
 use vigil_pomdp::mdp;
 
@@ -12,7 +12,7 @@ use super::compare::contestant::{Contestant, Knowledge};
 use super::compare::{among, count, solved_by};
 use super::escalation::EscalationArgs;
 use super::planner::PlannerArgs;
-use super::{load, missions, seed};
+use super::{load, seed};
 use vigil_terminal::output::Progress;
 use vigil_terminal::{CommandError, Outcome};
 
@@ -84,13 +84,13 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let failed =
         |error: std::io::Error| CommandError::failure(format!("{}: {error}", args.out.display()));
     let mut out = BufWriter::new(File::create(&args.out).map_err(failed)?);
-    missions::write_head(&mut out, contestant.label()).map_err(failed)?;
+    file::write_head(&mut out, contestant.label()).map_err(failed)?;
     let progress = Progress::new("missions", args.episodes as usize);
     let seed = seed::for_command("simulate", args.seed);
     for number in 0..args.episodes {
         let episode = Episode { seed, number };
         let (record, _) = Record::simulated(&model, &mut *agent, &rules, episode, args.states);
-        missions::write(&mut out, &model, &record).map_err(failed)?;
+        file::write(&mut out, &model, &record).map_err(failed)?;
         if number % 64 == 0 {
             progress.show(number as usize);
         }

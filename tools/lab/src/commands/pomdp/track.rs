@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use serde::Serialize;
+use vigil_missions::learning::file::index_of;
 use vigil_pomdp::{Evidence, Pomdp, Tracker};
 
-use super::{find, load, print};
+use super::{load, print};
 use vigil_terminal::{CommandError, Outcome};
 
 /// Prints the belief after each action and observation.
@@ -75,8 +76,8 @@ pub(super) fn pairs(model: &Pomdp, text: &str) -> Result<Vec<(usize, usize)>, St
         let (action, observation) = step
             .split_once(':')
             .ok_or_else(|| at(format!("'{step}', wanted is ACTION:OBSERVATION")))?;
-        let action = find(model.actions(), action.trim(), "action").map_err(at)?;
-        let z = find(model.observations(), observation.trim(), "observation").map_err(at)?;
+        let action = index_of(model.actions(), action.trim(), "action").map_err(at)?;
+        let z = index_of(model.observations(), observation.trim(), "observation").map_err(at)?;
         Ok((action, z))
     });
     steps.collect()

@@ -15,14 +15,12 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use vigil_missions::learning::Record;
 use vigil_pomdp::Pomdp;
 
-use super::find;
-use vigil_terminal::CommandError;
+use super::record::Record;
 
 /// What the first line says.
-pub const FORMAT: &str = "vigil-missions";
+const FORMAT: &str = "vigil-missions";
 const VERSION: u32 = 1;
 /// Longest line, bytes.
 const LINE_BYTES_MAX: u64 = 64 << 20;
@@ -57,20 +55,35 @@ struct Line {
 }
 
 /// Missions of a file.
-pub struct Missions {
+#[derive(Debug, Clone)]
+pub struct MissionFile {
     /// Rule by which they were flown, if it is told.
     pub policy: Option<String>,
     /// The missions.
     pub records: Vec<Record>,
 }
 
+/// A file that is refused: where, what was found and what is allowed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{path}:{line}: {problem}")]
+pub struct MissionFileError {
+    /// The file.
+    pub path: String,
+    /// Line, from 1; 0 for the file itself.
+    pub line: usize,
+    /// What is wrong.
+    pub problem: String,
+}
+
 /// Reads a file of missions of `model`.
 ///
 /// # Errors
 /// File and line, what was found and what is allowed.
-pub fn read(path: &Path, model: &Pomdp) -> Result<Missions, CommandError> {
-    let wrong = |line: usize, problem: &dyn std::fmt::Display| {
-        CommandError::usage(format!("{}:{line}: {problem}", path.display()))
+pub fn read(path: &Path, model: &Pomdp) -> Result<MissionFile, MissionFileError> {
+    let wrong = |line: usize, problem: &dyn std::fmt::Display| MissionFileError {
+        path: path.display().to_string(),
+        line,
+        problem: problem.to_string(),
     };
     let file = File::open(path).map_err(|e| wrong(0, &e))?;
     let mut reader = BufReader::new(file);
@@ -97,7 +110,7 @@ pub fn read(path: &Path, model: &Pomdp) -> Result<Missions, CommandError> {
             }
             policy = head.policy;
         } else if bytes == 0 {
-            return Ok(Missions { policy, records });
+            return Ok(MissionFile { policy, records });
         } else if !text.trim().is_empty() {
             let line: Line = serde_json::from_str(&text).map_err(|e| wrong(number, &e))?;
             records.push(record(model, &line).map_err(|e| wrong(number, &e))?);
@@ -105,13 +118,31 @@ pub fn read(path: &Path, model: &Pomdp) -> Result<Missions, CommandError> {
     }
 }
 
+/// The index of a name, or of an index; `what` it names is told with the names that are allowed.
+///
+/// # Errors
+/// What was found and what is allowed.
+pub fn index_of(names: &[String], word: &str, what: &str) -> Result<usize, String> {
+    let by_name = names.iter().position(|name| name == word);
+    let index = by_name.or_else(|| word.parse().ok().filter(|i| *i < names.len()));
+    index.ok_or_else(|| {
+        const SHOWN: usize = 12;
+        let more = if names.len() > SHOWN { " ..." } else { "" };
+        let some = names[..names.len().min(SHOWN)].join(" ");
+        format!(
+            "'{word}' is no {what}, allowed are {some}{more}, or 0 to {}",
+            names.len() - 1
+        )
+    })
+}
+
 fn record(model: &Pomdp, line: &Line) -> Result<Record, String> {
     let list = |names: &[String], words: &[String], what| -> Result<Vec<u32>, String> {
-        let find = |word: &String| find(names, word, what).map(|index| index as u32);
+        let find = |word: &String| index_of(names, word, what).map(|index| index as u32);
         words.iter().map(find).collect()
     };
     let state = |word: &Option<String>| match word {
-        Some(word) => find(model.states(), word, "state").map(|index| Some(index as u32)),
+        Some(word) => index_of(model.states(), word, "state").map(|index| Some(index as u32)),
         None => Ok(None),
     };
     let record = Record {

@@ -1,0 +1,110 @@
+//! `vigil pomdp fit`: parameters of a model of exceptions from recorded missions.
+
+use std::fs;
+use std::path::PathBuf;
+
+use serde::Serialize;
+use vigil_missions::exceptions::{self, Fit, FittedChance, Parameters};
+use vigil_missions::learning::file;
+use vigil_pomdp::Pomdp;
+use vigil_terminal::{CommandError, Outcome};
+
+use super::{print, save};
+
+/// Fits the chances of a file of parameters to missions whose true states are recorded.
+///
+/// Each chance is counted; the number in the file counts as --prior-strength visits. What no
+/// mission shows, and what the file rules out with a 0, stays as it is; so do rewards and prices.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Parameters of a model of exceptions, such as config/corridor.recovery.toml.
+    parameters: PathBuf,
+    /// Missions with states (JSON lines, see `vigil pomdp simulate`).
+    #[arg(long, value_name = "F")]
+    missions: PathBuf,
+    /// Visits that a number in the file counts as, from 0.
+    #[arg(long, value_name = "K", default_value_t = 10.0, value_parser = weight)]
+    prior_strength: f64,
+    /// Where to write the fitted parameters (TOML, without comments).
+    #[arg(long, value_name = "F")]
+    out: Option<PathBuf>,
+    /// Print one JSON document.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Document {
+    schema_version: u32,
+    parameters_file: String,
+    missions_file: String,
+    missions: usize,
+    steps: usize,
+    prior_strength: f64,
+    chances: Vec<FittedChance>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Files and options that are refused; a file that cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let name = args.parameters.display();
+    let refused = |error: &dyn std::fmt::Display| CommandError::usage(format!("{name}: {error}"));
+    let text = fs::read_to_string(&args.parameters).map_err(|e| refused(&e))?;
+    let parameters: Parameters = toml::from_str(&text).map_err(|e| refused(&e))?;
+    let model = exceptions::generate(&parameters).map_err(|e| refused(&e))?;
+    let model = Pomdp::parse(&model).map_err(|e| refused(&e))?;
+    let flown = file::read(&args.missions, &model).map_err(CommandError::usage)?;
+    let Fit {
+        parameters,
+        chances,
+        steps,
+    } = exceptions::fit(&parameters, &model, &flown.records, args.prior_strength);
+    if steps == 0 {
+        let missions = args.missions.display();
+        let problem = "no step between two known states: allowed are missions with 'states'";
+        return Err(CommandError::usage(format!("{missions}: {problem}")));
+    }
+    let document = Document {
+        schema_version: 1,
+        parameters_file: name.to_string(),
+        missions_file: args.missions.display().to_string(),
+        missions: flown.records.len(),
+        steps,
+        prior_strength: args.prior_strength,
+        chances,
+    };
+    if let Some(out) = &args.out {
+        let text = toml::to_string(&parameters).map_err(CommandError::failure)?;
+        save(out, text)?;
+    }
+    print(args.json, &document, || text_of(&document))?;
+    Ok(Outcome::Done)
+}
+
+fn text_of(document: &Document) -> String {
+    let width = document.chances.iter().map(|c| c.key.len()).max();
+    let width = width.unwrap_or(0);
+    let mut lines = vec![
+        format!(
+            "{} missions, {} steps between known states",
+            document.missions, document.steps
+        ),
+        format!("{:width$}  by hand  fitted  95 %            counted", ""),
+    ];
+    lines.extend(document.chances.iter().map(|chance| {
+        let [low, high] = chance.interval;
+        format!(
+            "{:width$}  {:7.4}  {:6.4}  {low:.4} to {high:.4}  {:.0} of {:.0}",
+            chance.key, chance.by_hand, chance.fitted, chance.count, chance.visits
+        )
+    }));
+    lines.join("\n")
+}
+
+fn weight(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    let number = number.filter(|n: &f64| n.is_finite() && *n >= 0.0);
+    number.ok_or_else(|| "allowed is a number from 0".to_owned())
+}
