@@ -207,8 +207,8 @@ mod tests {
             unreachable!("two commanders have two scores");
         };
         assert_eq!((ladder.done, ladder.calls), (1.0, 0.0), "{ladder:?}");
-        // With rungs that are climbed in vain it takes a minute.
-        assert!(ladder.time_s < 45.0, "{ladder:?}");
+        // Without a rung it would stand until the end.
+        assert!(ladder.time_s < 60.0, "{ladder:?}");
         assert_eq!(without.done, 0.0, "without, it stands before it");
     }
 }
