@@ -49,10 +49,10 @@ pub(super) struct CorridorCommander<'a> {
 }
 
 enum Mind {
-    Vigil(Box<Stages>),
+    /// With what tries something else, if anything does.
+    Vigil(Box<Stages>, Option<Explorer>),
     Ladder(Box<Stages>, Escalation),
     Without,
-    Explorer(Box<Stages>, Explorer),
 }
 
 impl<'a> CorridorCommander<'a> {
@@ -64,11 +64,11 @@ impl<'a> CorridorCommander<'a> {
         let (sensors, rate_hz) = (setup.file.detector.sensors, setup.file.graph.rate_hz);
         let stages = || simulated::stages(setup, sensors, rate_hz, seed).map(Box::new);
         let mind = match arm {
-            CorridorArm::Vigil => Mind::Vigil(stages()?),
+            CorridorArm::Vigil => Mind::Vigil(stages()?, None),
             CorridorArm::Ladder(settings) => Mind::Ladder(stages()?, Escalation::new(settings)),
             CorridorArm::Without => Mind::Without,
             CorridorArm::Explorer(share) => {
-                Mind::Explorer(stages()?, Explorer::new(setup, share, seed))
+                Mind::Vigil(stages()?, Some(Explorer::new(setup, share, seed)))
             }
         };
         Ok(Self {
@@ -82,15 +82,12 @@ impl<'a> CorridorCommander<'a> {
     /// The action after a frame; `dt_s` is the time between frames.
     pub(super) fn command(&mut self, frame: &SensorFrame, dt_s: f64) -> &Action {
         let (output, number) = match &mut self.mind {
-            Mind::Vigil(stages) => {
+            Mind::Vigil(stages, explorer) => {
                 stages.take(frame);
                 *self.action = *stages.action();
-                return &self.action;
-            }
-            Mind::Explorer(stages, explorer) => {
-                stages.take(frame);
-                *self.action = *stages.action();
-                explorer.change(&mut self.action, frame);
+                if let Some(explorer) = explorer {
+                    explorer.change(&mut self.action, frame);
+                }
                 return &self.action;
             }
             Mind::Ladder(stages, ladder) => {

@@ -62,8 +62,8 @@ impl Explorer {
 
     /// Changes an action block to what is done, and its last step to what was done.
     pub(super) fn change(&mut self, action: &mut Action, frame: &SensorFrame) {
-        let is_step = std::mem::replace(&mut self.step_count, action.step_count);
-        if is_step != action.step_count
+        let before = std::mem::replace(&mut self.step_count, action.step_count);
+        if before != action.step_count
             && let Some(done) = self.instead
         {
             action.step_action = self.step_action(done, action.step_action, frame);

@@ -72,9 +72,9 @@ impl Navigator {
         };
         // Behind the block the robot could come there from the path: no wall is between.
         let mut sides = (-SIDE_STEPS..=SIDE_STEPS).filter(|side| {
-            let between = side.min(&0).to_owned()..=side.max(&0).to_owned();
-            between.into_iter().all(|side| is_free(behind_m, side))
-                && places(block_m, behind_m).all(|along_m| is_free(along_m, *side))
+            let side = *side;
+            (side.min(0)..=side.max(0)).all(|between| is_free(behind_m, between))
+                && places(block_m, behind_m).all(|along_m| is_free(along_m, side))
         });
         match self.opening(behind_m) {
             Some(_) => WayAhead::Passable,

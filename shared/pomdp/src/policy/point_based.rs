@@ -126,8 +126,8 @@ impl PointBased {
 
 impl Policy for PointBased {
     fn evaluate(&mut self, belief: &[f64], values: &mut [f64]) -> Choice {
+        self.worth.fill(0.0);
         if let Some(shown) = &mut self.shown {
-            self.worth.fill(0.0);
             shown.sum.fill(0.0);
             for states in &shown.parts {
                 shown.worth.fill(0.0);
@@ -147,7 +147,6 @@ impl Policy for PointBased {
                 parts.for_each(|(sum, best)| *sum += best);
             }
         } else {
-            self.worth.fill(0.0);
             for (state, b) in belief.iter().enumerate() {
                 add(&mut self.worth, *b, &self.columns, state);
             }

@@ -88,7 +88,7 @@ fn of_kind<'a>(set: &[&'a Exception], kind: &str) -> Option<&'a str> {
     of_kind.map(|e| e.name.as_str())
 }
 
-/// k of n, and the chance by hand that counts as `weight` visits.
+/// k of n visits.
 #[derive(Debug, Clone, Copy, Default)]
 struct Count {
     k: f64,
@@ -143,7 +143,7 @@ impl Fitter<'_> {
         });
     }
 
-    fn signs(&mut self, signs: &mut Signs, exception: Option<&str>, actions: &[Action]) {
+    fn signs(&mut self, signs: &mut Signs, exception: Option<&str>) {
         let key = |of: &str, name: &str| format!("{}: {of} {name}", exception.unwrap_or("nominal"));
         let steps = self.steps;
         for (name, p) in &mut signs.symptoms {
@@ -153,15 +153,8 @@ impl Fitter<'_> {
             self.set(key("symptom", name), p, count);
         }
         for (name, p) in &mut signs.outcomes {
-            let reports = |action: &&Action| action.reports.contains(name);
-            let reporting: Vec<&str> = actions
-                .iter()
-                .filter(reports)
-                .map(|action| action.name.as_str())
-                .collect();
-            let is_visit = |step: &Step<'_>| {
-                step.shows_alone(exception) && reporting.contains(&step.action.name.as_str())
-            };
+            let is_visit =
+                |step: &Step<'_>| step.shows_alone(exception) && step.action.reports.contains(name);
             let count = Count::among(steps, is_visit, |step| step.sees(name));
             self.set(key("outcome", name), p, count);
         }
@@ -272,14 +265,14 @@ pub fn fit(parameters: &Parameters, model: &Pomdp, records: &[Record], weight: f
         weight,
         chances: Vec::new(),
     };
-    fitter.signs(&mut fitted.nominal, None, &parameters.actions);
+    fitter.signs(&mut fitted.nominal, None);
     for exception in &mut fitted.exceptions {
         let name = exception.name.clone();
         fitter.arises(exception);
         fitter.passes(exception);
         fitter.mended(exception);
         fitter.turns(exception);
-        fitter.signs(&mut exception.signs, Some(&name), &parameters.actions);
+        fitter.signs(&mut exception.signs, Some(&name));
     }
     let exceptions = fitted.exceptions.iter();
     let expected = exceptions.map(|e| (e.name.as_str(), &e.signs)).collect();
