@@ -86,7 +86,7 @@ impl ShippedGraph {
 
     /// The commanders, Vigil first.
     #[must_use]
-    pub const fn arms(&self) -> [Arm; 7] {
+    pub const fn arms(&self) -> [Arm; 8] {
         let Rules {
             careful,
             stop_and_call,
@@ -100,6 +100,7 @@ impl ShippedGraph {
             Arm::Heuristic,
             Arm::Without,
             Arm::Told,
+            Arm::ToldAtAlarm,
         ]
     }
 

@@ -1,6 +1,8 @@
 //! The paper's two stories through the four processes.
 
-use crate::harness::{RunningGraph, Summary, machine};
+use std::fs;
+
+use crate::harness::{RunningGraph, Summary, binary, machine};
 
 /// Decisions, symptoms, outcomes and the goal, in order, from the first decision on.
 fn story(summary: &Summary) -> Vec<String> {
@@ -41,6 +43,48 @@ fn a_blocked_corridor_is_tried_and_gone_round_live() {
     let decided: Vec<String> = decided.into_iter().map(|(_, w)| w).collect();
     assert_eq!(obeyed, decided);
     assert!(!decided.contains(&"SH".to_owned()), "{decided:?}");
+    assert_each_decision_is_weighed(&summary);
+    assert_makes_a_mission(&summary);
+}
+
+/// What a decision was weighed from stands beside it.
+fn assert_each_decision_is_weighed(summary: &Summary) {
+    let events = summary.json["events"].as_array().unwrap();
+    let of_supervisor = events.iter().filter(|e| e["service"] == "supervisor");
+    let names: Vec<&str> = of_supervisor.filter_map(|e| e["event"].as_str()).collect();
+    let decisions = names.iter().filter(|name| **name == "action").count();
+    let pairs = names.windows(2).filter(|two| *two == ["action", "weighed"]);
+    assert!(decisions > 1, "{names:?}");
+    assert_eq!(pairs.count(), decisions, "{names:?}");
+}
+
+/// The steps of a run are a mission to learn from.
+fn assert_makes_a_mission(summary: &Summary) {
+    let folder = tempfile::tempdir().unwrap();
+    let [run, missions] = ["run.json", "missions.jsonl"].map(|name| folder.path().join(name));
+    fs::write(&run, summary.json.to_string()).unwrap();
+    let mut command = binary("vigil-lab");
+    command.args(["pomdp", "missions", "--model", "config/corridor.pomdp"]);
+    let status = command.arg(&run).arg("--out").arg(&missions).status();
+    assert!(status.unwrap().success());
+    let text = fs::read_to_string(&missions).unwrap();
+    let lines: Vec<serde_json::Value> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let [head, mission] = &lines[..] else {
+        panic!("one mission: {text}");
+    };
+    assert_eq!(head["format"], "vigil-missions");
+    let (mut actions, mut observations) = (Vec::new(), Vec::new());
+    let events = summary.json["events"].as_array().unwrap();
+    for event in events.iter().filter(|event| event["event"] == "step") {
+        actions.push(event["step"]["action"].clone());
+        observations.push(event["step"]["observation"].clone());
+    }
+    assert!(observations.contains(&"EPM".into()), "{observations:?}");
+    assert_eq!(mission["actions"], actions.into());
+    assert_eq!(mission["observations"], observations.into());
 }
 
 #[test]

@@ -25,6 +25,9 @@ pub enum Arm {
     Without,
     /// Told what breaks when it begins, and how it will go on.
     Told,
+    /// Told the same when the detector alarms, and as planned before: what no decision after the
+    /// alarm can better.
+    ToldAtAlarm,
 }
 
 impl Arm {
@@ -37,6 +40,7 @@ impl Arm {
             Self::Heuristic => "Q-MDP",
             Self::Without => "without",
             Self::Told => "told the fault",
+            Self::ToldAtAlarm => "told at the alarm",
         }
     }
 }
@@ -54,6 +58,8 @@ enum Mind {
     Rule(Box<Stages>, Rule, Follower),
     Without,
     Told,
+    /// True once the detector has alarmed while something was wrong.
+    ToldAtAlarm(Box<Stages>, bool),
 }
 
 impl<'a> Commander<'a> {
@@ -72,6 +78,7 @@ impl<'a> Commander<'a> {
             Arm::Rule(rule) => Mind::Rule(stages()?, rule, Follower::new(rule)),
             Arm::Without => Mind::Without,
             Arm::Told => Mind::Told,
+            Arm::ToldAtAlarm => Mind::ToldAtAlarm(stages()?, false),
         };
         Ok(Self {
             shipped,
@@ -101,6 +108,14 @@ impl<'a> Commander<'a> {
             }
             Mind::Without => RuleOutput::plain(RecoveryKind::GoOn),
             Mind::Told => told::best(&self.shipped.missions.prices, knowledge),
+            Mind::ToldAtAlarm(stages, is_told) => {
+                stages.take(frame);
+                *is_told |= stages.detection().alarm != 0 && !knowledge.present.is_empty();
+                match is_told {
+                    true => told::best(&self.shipped.missions.prices, knowledge),
+                    false => RuleOutput::plain(RecoveryKind::GoOn),
+                }
+            }
         };
         *self.action = action_block(&self.shipped.setup, output);
         &self.action
@@ -108,8 +123,10 @@ impl<'a> Commander<'a> {
 
     /// Whoever has helped restarts what remembers; the filters see a new run.
     pub(super) fn begin_anew(&mut self) {
-        if let Mind::Rule(_, rule, follower) = &mut self.mind {
-            *follower = Follower::new(*rule);
+        match &mut self.mind {
+            Mind::Rule(_, rule, follower) => *follower = Follower::new(*rule),
+            Mind::ToldAtAlarm(_, is_told) => *is_told = false,
+            Mind::Vigil(_) | Mind::Without | Mind::Told => {}
         }
     }
 }

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::commander::Arm;
 use super::drive::Mission;
 use super::kind::Kind;
-use super::score::{MEASURES, Measure, POINTS, Score};
+use super::score::{MEASURES, Measure, POINTS, Score, UNSAFE};
 use super::table::{Interval, ODDS, Table};
 use super::{HELP_S, LIMIT_S, MissionFile};
 use crate::archive::Archive;
@@ -79,7 +79,8 @@ pub fn say(
     archive.say(
         "*careful*, *stop and call*, *ladder*: rules, each tuned on other missions (`--sweep`). \
          *Q-MDP*: Vigil with this policy of the same model. *told the fault*: knows what breaks, \
-         when, and how it goes on.\n",
+         when, and how it goes on. *told at the alarm*: learns it when the detector alarms; what is \
+         lost until then is the detector's.\n",
     );
     archive.say("## Points\n");
     let names: Vec<&str> = arms.iter().map(Arm::name).collect();
@@ -106,6 +107,11 @@ pub fn say(
         let cell = |arm| table.over_kinds(1.0, |kind| table.mean(kind, arm, measure));
         let cells = (0..arms.len()).map(|arm| cell(arm).text(measure.decimals, false));
         archive.say(&row(measure.name, cells.collect()));
+    }
+    archive.say("\n## Ended unsafely\n");
+    archive.say(&head("share of missions", &names));
+    for (name, cell) in rows(&table, UNSAFE, Side::Mean) {
+        archive.say(&row(&name, cell));
     }
     archive.say("");
     let short = shortfalls(file, arms, missions);
@@ -251,8 +257,8 @@ mod tests {
     fn bars_are_judged_by_the_paired_difference() {
         let shipped = ShippedGraph::read("rover.toml".as_ref(), 100.0).unwrap();
         let arms = shipped.arms();
-        // Points of Vigil, the three rules, Q-MDP, without, told.
-        let driven = |points: [f64; 7], unanswered_m: f64| -> Vec<Mission> {
+        // Points of Vigil, the three rules, Q-MDP, without, told, told at the alarm.
+        let driven = |points: [f64; 8], unanswered_m: f64| -> Vec<Mission> {
             let plans = Plan::of_all_kinds(3, 1).into_iter();
             let mission = |plan: Plan| {
                 let noise = (plan.seed % 3) as f64;
@@ -272,14 +278,14 @@ mod tests {
         let short = |points, unanswered_m| {
             shortfalls(&shipped.missions, &arms, &driven(points, unanswered_m))
         };
-        assert!(short([8.0, 0.0, -5.0, -9.0, 7.0, -9.0, 10.0], 0.5).is_empty());
+        assert!(short([8.0, 0.0, -5.0, -9.0, 7.0, -9.0, 10.0, 9.0], 0.5).is_empty());
         // 4 of a gap of 10, at three odds; and every mission ended unsafely.
-        let found = short([4.0, 0.0, -5.0, -9.0, 3.0, -9.0, 10.0], 1.5);
+        let found = short([4.0, 0.0, -5.0, -9.0, 3.0, -9.0, 10.0, 9.0], 1.5);
         assert_eq!(found.len(), 4, "{found:?}");
         assert_eq!(found[3], "21 of 21 missions ended unsafely, bar 0");
         // Behind the ladder: overall twice at each of the odds, and in every kind but the two with
         // a wider bar.
-        let found = short([0.0, -9.0, -9.0, 5.0, 1.0, -9.0, 10.0], 0.0);
+        let found = short([0.0, -9.0, -9.0, 5.0, 1.0, -9.0, 10.0, 9.0], 0.0);
         assert_eq!(found.len(), 6 + 5 + 1, "{found:?}");
         assert_eq!(found[11], "-1.0 ± 0.0 against Q-MDP, bar above 0");
         assert_eq!(

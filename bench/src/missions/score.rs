@@ -157,6 +157,14 @@ pub struct Measure<S> {
 /// The points, which decide.
 pub const POINTS: Measure<Score> = measure("points", "points", |s| s.points, 1);
 
+/// 1 for a mission that ended unsafely.
+pub const UNSAFE: Measure<Score> = measure(
+    "unsafe",
+    "ended unsafely",
+    |s| f64::from(u8::from(s.is_unsafe())),
+    4,
+);
+
 /// What is reported of a mission; the points first.
 pub const MEASURES: [Measure<Score>; 10] = [
     POINTS,
@@ -178,12 +186,7 @@ pub const MEASURES: [Measure<Score>; 10] = [
     measure("calls", "calls for help", |s| s.calls, 3),
     measure("time_s", "time, s", |s| s.time_s, 1),
     measure("done", "driven to the end", |s| s.done, 3),
-    measure(
-        "unsafe",
-        "ended unsafely",
-        |s| f64::from(u8::from(s.is_unsafe())),
-        4,
-    ),
+    UNSAFE,
 ];
 
 /// A figure of a mission; the fields of [`Measure`] in their order.

@@ -113,6 +113,7 @@ impl Children {
                 match spawn(plan.command_again(service.name, &service.report, drive.as_ref())) {
                     Ok(child) => {
                         service.child = child;
+                        observer.timeline.add_restart(service.name);
                         self.restarted.push(service.name);
                     }
                     Err(error) => {

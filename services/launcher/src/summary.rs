@@ -256,7 +256,7 @@ impl fmt::Display for Summary {
         }
         self.unseen(f)?;
         writeln!(f, "  timeline:")?;
-        for event in &self.events {
+        for event in self.events.iter().filter(|event| event.is_told()) {
             writeln!(f, "  {event}")?;
         }
         if let Some(gave_up) = &self.gave_up {

@@ -11,6 +11,7 @@ use vigil_blocks::{
 use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::watchdog::WatchdogFinding;
+use vigil_cycle::{Clock, Monotonic};
 use vigil_robot::channel::{Role, channels};
 use vigil_robot::injection::{Change, WireChange};
 use vigil_robot::publisher_check::Finding;
@@ -39,6 +40,34 @@ pub struct TimelineEntry {
     /// Of what a decision was weighed from.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weighing: Option<NamedWeighing>,
+    /// Of a step of the decision model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step: Option<NamedStep>,
+}
+
+/// A step of the decision model, with its names.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct NamedStep {
+    /// Steps of one belief have one number: it began anew between others.
+    pub belief: u32,
+    /// The action.
+    pub action: String,
+    /// What was observed after it; `None` for what the model does not have.
+    pub observation: Option<String>,
+}
+
+impl fmt::Display for NamedStep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let observation = self.observation.as_deref();
+        write!(f, "{} {}", self.action, observation.unwrap_or("?"))
+    }
+}
+
+impl TimelineEntry {
+    /// False for what only programs read: each step of the decision model.
+    pub const fn is_told(&self) -> bool {
+        self.step.is_none()
+    }
 }
 
 impl fmt::Display for TimelineEntry {
@@ -120,6 +149,16 @@ impl Timeline {
         });
     }
 
+    /// Adds that a service was started again.
+    pub fn add_restart(&mut self, service: ServiceName) {
+        let restart = Event {
+            t_ns: Monotonic.now_ns(),
+            kind: EventKind::Restarted as u32,
+            ..Event::default()
+        };
+        self.add(service, &restart);
+    }
+
     /// Events after `t_ns` are of no interest: the services are being stopped.
     pub const fn close(&mut self, t_ns: u64) {
         self.closed_ns = Some(t_ns);
@@ -184,7 +223,9 @@ impl Timeline {
             let new = self.records[self.shown..].iter();
             for record in new.filter(|record| self.is_shown(&record.event)) {
                 let entry = self.namer.entry(record, origin_ns);
-                tell!("{entry}");
+                if entry.is_told() {
+                    tell!("{entry}");
+                }
             }
         }
         if origin_ns.is_some() || !show {
@@ -252,6 +293,7 @@ struct Namer {
     nodes: Vec<String>,
     states: Vec<String>,
     actions: Vec<String>,
+    observations: Vec<String>,
     /// The user's own, each with the set that holds it alone.
     symptoms: Vec<(String, u32)>,
     robot: vigil_robot::Description,
@@ -266,6 +308,7 @@ impl Namer {
             nodes: nodes.map(|node| node.name.clone()).collect(),
             states: setup.decision.states().to_vec(),
             actions: setup.decision.actions().to_vec(),
+            observations: setup.decision.observations().to_vec(),
             symptoms: symptoms
                 .map(|(name, own)| (name.clone(), own.set()))
                 .collect(),
@@ -293,7 +336,17 @@ impl Namer {
             fault_set: (kind == Some(EventKind::Diagnosis) && event.what == MODE_MULTIPLE)
                 .then(|| self.set(event.value)),
             weighing: self.weighing(event),
+            step: self.step(event),
         }
+    }
+
+    fn step(&self, event: &Event) -> Option<NamedStep> {
+        let name = |names: &[String], at: usize| names.get(at).cloned();
+        (event.kind == EventKind::Step as u32).then(|| NamedStep {
+            belief: (event.value >> 32) as u32,
+            action: name(&self.actions, event.what as usize).unwrap_or_else(|| "?".to_owned()),
+            observation: name(&self.observations, event.value as u32 as usize),
+        })
     }
 
     fn weighing(&self, event: &Event) -> Option<NamedWeighing> {
@@ -389,6 +442,9 @@ impl Namer {
             EventKind::Weighed => self
                 .weighing(event)
                 .map_or_else(|| "?".into(), |weighing| weighing.to_string()),
+            EventKind::Step => self
+                .step(event)
+                .map_or_else(|| "?".into(), |step| step.to_string()),
             EventKind::Particles => format!("{} of {}", event.what, event.value),
             EventKind::Watchdog => {
                 let found = WatchdogFinding::from_repr(event.what);

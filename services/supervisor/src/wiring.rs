@@ -21,6 +21,9 @@ pub struct SupervisorStage {
     validity_ns: u64,
     action: Box<dyn Sender<Action>>,
     decided: LastDecision,
+    step: ModelStep,
+    /// Steps that the timeline has.
+    steps_reported: u64,
     /// Number of the decision that the timeline has.
     decision_reported: u64,
     alarm: AlarmCount,
@@ -34,6 +37,15 @@ pub struct SupervisorStage {
 struct AlarmCount {
     stands: bool,
     count: u32,
+}
+
+/// The decision model's last step.
+#[derive(Debug, Clone, Copy, Default)]
+struct ModelStep {
+    belief: u64,
+    count: u64,
+    action: u32,
+    observation: u32,
 }
 
 /// What the last block decided, for the timeline.
@@ -63,6 +75,8 @@ impl SupervisorStage {
             validity_ns,
             action: graph.sender(Topic::Action)?,
             decided: LastDecision::default(),
+            step: ModelStep::default(),
+            steps_reported: 0,
             decision_reported: 0,
             alarm: AlarmCount::default(),
             alarm_reported: AlarmCount::default(),
@@ -91,8 +105,19 @@ impl SupervisorStage {
         }
     }
 
-    /// Puts each fused alarm and each latched action into the timeline.
+    /// Puts each step of the model, each fused alarm and each latched action into the timeline.
     fn report(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        let ModelStep {
+            belief,
+            count,
+            action,
+            observation,
+        } = self.step;
+        if count != self.steps_reported {
+            let value = u64::from(observation) | belief << 32;
+            health.event(now_ns, EventKind::Step, action, 0.0, value);
+            self.steps_reported = count;
+        }
         let AlarmCount { stands, count } = self.alarm;
         if self.alarm != self.alarm_reported {
             let kind = match stands {
@@ -161,6 +186,12 @@ impl Stage for SupervisorStage {
         self.alarm = AlarmCount {
             stands: action.alarm != 0,
             count: action.alarm_count,
+        };
+        self.step = ModelStep {
+            belief: action.belief_count,
+            count: action.step_count,
+            action: action.step_action,
+            observation: action.step_observation,
         };
         let states = (action.state_count as usize).min(action.belief.len());
         self.decided = LastDecision {

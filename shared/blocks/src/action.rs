@@ -12,7 +12,7 @@ pub const DECISION_ACTIONS: usize = 32;
 
 block! {
     /// Written by the supervisor every cycle; valid until `valid_until_ns`.
-    pub struct Action, size 1000 {
+    pub struct Action, size 1008 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this decision.
@@ -73,6 +73,9 @@ block! {
         pub alarm_count: u32,
         /// Why nothing is seen: a [`crate::Blindness`]; 0 while something is.
         pub blind: u32,
+        /// Counts beliefs that began anew: at a reset, and at a new run that is not the success of
+        /// an action.
+        pub belief_count: u64,
         /// Steps of the decision model so far, with symptoms; 0 with faults, whose evidence is no
         /// observation of the model.
         pub step_count: u64,

@@ -74,6 +74,8 @@ pub(crate) struct DecisionProcess {
     pub decision_seq: u64,
     pub log_evidence: f64,
     pub impossible_count: u32,
+    /// Counts beliefs that began anew.
+    pub belief_count: u64,
     /// Steps of the model, and the last one.
     pub step_count: u64,
     pub step: Step,
@@ -102,6 +104,7 @@ impl DecisionProcess {
             decision_seq: 0,
             log_evidence: 0.0,
             impossible_count: 0,
+            belief_count: 0,
             step_count: 0,
             step: Step::default(),
             control_mode: ControlMode::Policy,
@@ -115,6 +118,7 @@ impl DecisionProcess {
     pub(crate) fn reset(&mut self) {
         self.tracker.reset();
         self.decider.reset();
+        self.belief_count += 1;
         self.log_evidence = 0.0;
         self.control_mode = ControlMode::Policy;
     }
@@ -193,6 +197,7 @@ impl DecisionProcess {
         action.curvature_offset = 0.0;
         action.log_evidence = self.log_evidence;
         action.impossible_count = self.impossible_count;
+        action.belief_count = self.belief_count;
         action.step_count = self.step_count;
         action.step_action = self.step.action as u32;
         action.step_observation = self.step.observation.map_or(u32::MAX, |z| z as u32);

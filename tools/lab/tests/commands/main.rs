@@ -13,6 +13,7 @@ mod offline;
 mod pomdp;
 mod pomdp_compare;
 mod pomdp_learn;
+mod pomdp_missions;
 mod pomdp_solve;
 mod report;
 mod workplace;

@@ -7,6 +7,7 @@ mod fit;
 mod generate;
 mod info;
 mod learn;
+mod missions;
 mod picture;
 mod planner;
 mod seed;
@@ -37,6 +38,7 @@ enum Command {
     Generate(generate::Args),
     Info(info::Args),
     Learn(learn::Args),
+    Missions(missions::Args),
     Picture(picture::Args),
     Simulate(simulate::Args),
     Track(track::Args),
@@ -56,6 +58,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         Command::Generate(args) => generate::run(args),
         Command::Info(args) => info::run(args),
         Command::Learn(args) => learn::run(args),
+        Command::Missions(args) => missions::run(args),
         Command::Picture(args) => picture::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Track(args) => track::run(args),
