@@ -103,31 +103,52 @@ impl Default for NoiseScales {
 
 /// Running estimate of the ratio of measurement variance to the learned variance, from differences
 /// that no slow motion and no persistent fault affects.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NoiseScale {
+    seen: Seen,
+    /// The last squares over that of the noise, newest last.
+    squares: [f64; 3],
+    /// What was seen before the channel was suspected, and samples since then.
+    before: Seen,
+    suspected: u32,
+}
+
+/// What was seen of a channel's noise, fading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Seen {
     sum: f64,
     count: f64,
     outliers: f64,
     /// Samples of which it was asked whether they are outliers.
     asked: f64,
-    /// The last squares over that of the noise, newest last.
-    squares: [f64; 3],
-    /// Ratio before the channel was suspected, and samples since then.
-    before: f64,
-    suspected: u32,
 }
 
-impl Default for NoiseScale {
+impl Default for Seen {
     fn default() -> Self {
         Self {
             sum: PRIOR,
             count: PRIOR,
             outliers: 0.0,
             asked: ASKED,
-            squares: [0.0; 3],
-            before: 1.0,
-            suspected: 0,
         }
+    }
+}
+
+impl Seen {
+    /// Ratio of the variances as it is believed to be.
+    fn believed(&self) -> f64 {
+        (self.sum / self.count).max(RATIO_MIN)
+    }
+
+    fn take(&mut self, normalised_square: f64) {
+        let largest = CLIP * self.believed();
+        self.sum = self.sum * FADING + normalised_square.clamp(0.0, largest) / CLIPPED_MEAN;
+        self.count = self.count * FADING + 1.0;
+    }
+
+    fn take_outlier(&mut self, is_outlier: bool) {
+        self.outliers = self.outliers * FADING + f64::from(u8::from(is_outlier));
+        self.asked = self.asked * FADING + 1.0;
     }
 }
 
@@ -154,8 +175,7 @@ impl NoiseScale {
         if is_outlier {
             self.squares = [0.0; 3];
         }
-        self.outliers = self.outliers * FADING + f64::from(u8::from(is_outlier));
-        self.asked = self.asked * FADING + 1.0;
+        self.seen.take_outlier(is_outlier);
         self.take(normalised_square);
     }
 
@@ -169,29 +189,32 @@ impl NoiseScale {
     }
 
     fn take(&mut self, normalised_square: f64) {
-        let largest = CLIP * self.believed();
-        self.sum = self.sum * FADING + normalised_square.clamp(0.0, largest) / CLIPPED_MEAN;
-        self.count = self.count * FADING + 1.0;
+        self.seen.take(normalised_square);
         if self.suspected == 0 {
-            self.before = self.believed();
+            self.before = self.seen;
         }
     }
 
-    /// Ratio of the variances of a healthy channel. While it is suspected more noise may be the
-    /// fault: it is believed once it has settled within what a healthy one may have.
-    fn healthy(&self) -> f64 {
-        let believed = self.believed();
-        match self.suspected {
-            0 => believed,
-            1..=SETTLED => self.before,
-            _ if believed <= RATIO_MAX => believed,
-            _ => self.before,
+    /// What was seen of the healthy channel. While it is suspected more noise may be the fault: it
+    /// is believed once it has settled within what a healthy one may have.
+    fn healthy(&self) -> &Seen {
+        let has_settled = self.suspected > SETTLED && self.seen.believed() <= RATIO_MAX;
+        match self.suspected == 0 || has_settled {
+            true => &self.seen,
+            false => &self.before,
         }
     }
 
-    /// Ratio of the variances as it is believed to be.
-    fn believed(&self) -> f64 {
-        (self.sum / self.count).max(RATIO_MIN)
+    /// What was seen while the channel was suspected is forgotten with the suspicion, unless it is
+    /// believed: it was the fault's, and would hide the next one.
+    fn suspect(&mut self, is_suspected: bool) {
+        if is_suspected {
+            self.suspected = self.suspected.saturating_add(1);
+        } else if self.suspected > 0 {
+            self.seen = *self.healthy();
+            self.squares = [0.0; 3];
+            self.suspected = 0;
+        }
     }
 
     /// Takes the first difference of a channel whose samples have the learned standard deviation
@@ -205,10 +228,7 @@ impl NoiseScale {
         expected: f64,
         is_suspected: bool,
     ) {
-        self.suspected = match is_suspected {
-            true => self.suspected.saturating_add(1),
-            false => 0,
-        };
+        self.suspect(is_suspected);
         if last_read.plain == 0 || now_read.plain == 0 {
             return;
         }
@@ -221,13 +241,16 @@ impl NoiseScale {
     /// True once the noise has been seen often enough.
     #[must_use]
     pub fn is_known(&self) -> bool {
-        self.count >= PRIOR + KNOWN
+        self.seen.count >= PRIOR + KNOWN
     }
 
     /// Share of the samples that are outliers.
     #[must_use]
     pub fn outlier_rate(&self) -> f64 {
-        (self.outliers / self.asked).clamp(OUTLIER_RATE_MIN, OUTLIER_RATE_MAX)
+        let Seen {
+            outliers, asked, ..
+        } = self.seen;
+        (outliers / asked).clamp(OUTLIER_RATE_MIN, OUTLIER_RATE_MAX)
     }
 
     /// Ratio of the variances. It is larger than its estimate by as much as makes residuals of
@@ -245,9 +268,9 @@ impl NoiseScale {
     /// The same without bounds: of a channel that may be broken.
     fn leaning(&self, deviance: f64) -> f64 {
         // Second differences are correlated by -2/3 and 1/6: 2 (1 + 2 (4/9 + 1/36)) = 3.9.
-        let freedom = 2.0 * self.count / 3.9;
+        let freedom = 2.0 * self.seen.count / 3.9;
         let wider = deviance / ((freedom + 1.0) * (deviance / freedom).ln_1p());
-        self.healthy() * wider
+        self.healthy().believed() * wider
     }
 }
 
@@ -282,7 +305,7 @@ impl SensorNoise {
         let sd = |scale: &NoiseScale, deviance: f64| {
             let unseen = match self.moved_s < UNSEEN_S {
                 true => 0.0,
-                false => ((PRIOR + KNOWN - scale.count) / KNOWN).clamp(0.0, 1.0),
+                false => ((PRIOR + KNOWN - scale.seen.count) / KNOWN).clamp(0.0, 1.0),
             };
             let ratio = scale.ratio(deviance);
             (ratio + unseen * (UNSEEN - ratio).max(0.0)).sqrt()
@@ -374,10 +397,11 @@ impl SensorNoise {
 /// Outlier rates of channels of one kind: at least what was seen of all together, but for the one
 /// that has most, which may be broken.
 fn outlier_rates<const N: usize>(all: &[NoiseScale; N]) -> [f64; N] {
-    let most = |a: &&NoiseScale, b: &&NoiseScale| a.outliers.total_cmp(&b.outliers);
+    let most = |a: &&NoiseScale, b: &&NoiseScale| a.seen.outliers.total_cmp(&b.seen.outliers);
     let most = all.iter().max_by(most).copied().unwrap_or_default();
-    let sum = |of: fn(&NoiseScale) -> f64| all.iter().map(of).sum::<f64>() - of(&most);
-    let (outliers, count) = (sum(|scale| scale.outliers), sum(|scale| scale.asked));
+    let sum =
+        |of: fn(&Seen) -> f64| all.iter().map(|it| of(&it.seen)).sum::<f64>() - of(&most.seen);
+    let (outliers, count) = (sum(|seen| seen.outliers), sum(|seen| seen.asked));
     let usual = (outliers + EXPECTED) / count;
     let bounded = |rate: f64| rate.clamp(OUTLIER_RATE_MIN, OUTLIER_RATE_MAX);
     all.each_ref()
@@ -444,6 +468,32 @@ mod tests {
                 assert!(share < 0.12, "{samples} of {ratio}: {share}");
             }
         }
+    }
+
+    #[test]
+    fn noise_of_a_fault_is_forgotten_with_the_suspicion_and_that_of_a_noisy_sensor_is_kept() {
+        let after = |ratio: f64, suspected: u32| {
+            let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
+            let mut scale = NoiseScale::default();
+            let mut push = |count, ratio: f64, is_suspected| {
+                for _ in 0..count {
+                    let x: f64 = rng.sample(StandardNormal);
+                    scale.suspect(is_suspected);
+                    scale.push(x * x * ratio, 1);
+                }
+                scale
+            };
+            let before = push(600, 1.0, false);
+            push(suspected, ratio, true);
+            scale.suspect(false);
+            (before, scale)
+        };
+        for (ratio, suspected) in [(400.0, 20), (400.0, 2000), (9.0, SETTLED)] {
+            let (before, after) = after(ratio, suspected);
+            assert_eq!(before.seen, after.seen, "{ratio} {suspected}");
+        }
+        let (_, after) = after(9.0, 2 * SETTLED);
+        assert!(after.variance_ratio() > 4.0, "{}", after.variance_ratio());
     }
 
     #[test]
