@@ -444,8 +444,8 @@ VIGIL_ASSERT(offsetof(vigil_fault_belief, identifying) == 2744);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, degenerate_count) == 2748);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, size_kind) == 2752);
 
-#define VIGIL_ACTION_SCHEMA 0x09fde6916ec19053ull
-#define VIGIL_ACTION_TYPE_NAME "vigil.Action.v1.09fde6916ec19053"
+#define VIGIL_ACTION_SCHEMA 0xdf8d467eb9b7f344ull
+#define VIGIL_ACTION_TYPE_NAME "vigil.Action.v1.df8d467eb9b7f344"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -503,6 +503,8 @@ typedef struct {
   uint32_t alarm_count;
   /* Why nothing is seen: a Blindness; 0 while something is. */
   uint32_t blind;
+  /* Counts beliefs that began anew: at a reset, and at a new run that is not the success of an action. */
+  uint64_t belief_count;
   /* Steps of the decision model so far, with symptoms; 0 with faults, whose evidence is no observation of the model. */
   uint64_t step_count;
   /* Action of the model's last step. */
@@ -510,7 +512,7 @@ typedef struct {
   /* Observation of the model's last step; u32::MAX for a set of symptoms that the model does not have. */
   uint32_t step_observation;
 } vigil_action;
-VIGIL_ASSERT(sizeof(vigil_action) == 1000);
+VIGIL_ASSERT(sizeof(vigil_action) == 1008);
 VIGIL_ASSERT(offsetof(vigil_action, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_action, cause) == 48);
 VIGIL_ASSERT(offsetof(vigil_action, run_id) == 72);
@@ -539,9 +541,10 @@ VIGIL_ASSERT(offsetof(vigil_action, alarm) == 964);
 VIGIL_ASSERT(offsetof(vigil_action, alarm_t_capture_ns) == 968);
 VIGIL_ASSERT(offsetof(vigil_action, alarm_count) == 976);
 VIGIL_ASSERT(offsetof(vigil_action, blind) == 980);
-VIGIL_ASSERT(offsetof(vigil_action, step_count) == 984);
-VIGIL_ASSERT(offsetof(vigil_action, step_action) == 992);
-VIGIL_ASSERT(offsetof(vigil_action, step_observation) == 996);
+VIGIL_ASSERT(offsetof(vigil_action, belief_count) == 984);
+VIGIL_ASSERT(offsetof(vigil_action, step_count) == 992);
+VIGIL_ASSERT(offsetof(vigil_action, step_action) == 1000);
+VIGIL_ASSERT(offsetof(vigil_action, step_observation) == 1004);
 
 #define VIGIL_HEALTH_SCHEMA 0x22ca8e52d533df67ull
 #define VIGIL_HEALTH_TYPE_NAME "vigil.Health.v1.22ca8e52d533df67"

@@ -83,8 +83,11 @@ fn assert_makes_a_mission(summary: &Summary) {
         observations.push(event["step"]["observation"].clone());
     }
     assert!(observations.contains(&"EPM".into()), "{observations:?}");
-    assert_eq!(mission["actions"], actions.into());
-    assert_eq!(mission["observations"], observations.into());
+    assert_eq!(mission["actions"], serde_json::Value::from(actions));
+    assert_eq!(
+        mission["observations"],
+        serde_json::Value::from(observations)
+    );
 }
 
 #[test]
