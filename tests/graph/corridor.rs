@@ -67,6 +67,20 @@ fn assert_makes_a_mission(summary: &Summary) {
     command.args(["pomdp", "missions", "--model", "config/corridor.pomdp"]);
     let status = command.arg(&run).arg("--out").arg(&missions).status();
     assert!(status.unwrap().success());
+    let mut command = binary("vigil-lab");
+    let learn = ["pomdp", "learn", "config/corridor.pomdp", "--unchecked"];
+    command.args(learn).arg("--missions").arg(&missions);
+    let options = ["--iterations", "1", "--episodes", "2", "--out"];
+    let learned = folder.path().join("learned.pomdp");
+    assert!(
+        command
+            .args(options)
+            .arg(learned)
+            .output()
+            .unwrap()
+            .status
+            .success()
+    );
     let text = fs::read_to_string(&missions).unwrap();
     let lines: Vec<serde_json::Value> = text
         .lines()

@@ -25,8 +25,8 @@ pub enum Arm {
     Without,
     /// Told what breaks when it begins, and how it will go on.
     Told,
-    /// Told the same when the detector alarms, and as planned before: what no decision after the
-    /// alarm can better.
+    /// Told the same from the detector's first alarm on, and as planned before: what no decision
+    /// after the alarm can better.
     ToldAtAlarm,
 }
 

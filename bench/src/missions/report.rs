@@ -79,8 +79,8 @@ pub fn say(
     archive.say(
         "*careful*, *stop and call*, *ladder*: rules, each tuned on other missions (`--sweep`). \
          *Q-MDP*: Vigil with this policy of the same model. *told the fault*: knows what breaks, \
-         when, and how it goes on. *told at the alarm*: learns it when the detector alarms; what is \
-         lost until then is the detector's.\n",
+         when, and how it goes on. *told at the alarm*: knows all of it from \
+         the detector's first alarm on; what is lost until then, no decision can save.\n",
     );
     archive.say("## Points\n");
     let names: Vec<&str> = arms.iter().map(Arm::name).collect();

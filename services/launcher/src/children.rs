@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
-use vigil_cycle::{Domain, RunReport, signal};
+use vigil_cycle::{Clock, Domain, Monotonic, RunReport, signal};
 
 use crate::error::LauncherError;
 use crate::observer::HealthObserver;
@@ -109,11 +109,11 @@ impl Children {
             if service.restart_at.is_some_and(|at| now >= at) && !signal::stop_requested() {
                 service.restart_at = None;
                 service.history.restarted(now);
-                let drive = observer.drive();
+                let (began_ns, drive) = (Monotonic.now_ns(), observer.drive());
                 match spawn(plan.command_again(service.name, &service.report, drive.as_ref())) {
                     Ok(child) => {
                         service.child = child;
-                        observer.timeline.add_restart(service.name);
+                        observer.timeline.add_restart(service.name, began_ns);
                         self.restarted.push(service.name);
                     }
                     Err(error) => {

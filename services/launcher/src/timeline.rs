@@ -11,7 +11,6 @@ use vigil_blocks::{
 use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::watchdog::WatchdogFinding;
-use vigil_cycle::{Clock, Monotonic};
 use vigil_robot::channel::{Role, channels};
 use vigil_robot::injection::{Change, WireChange};
 use vigil_robot::publisher_check::Finding;
@@ -25,7 +24,7 @@ use crate::words;
 pub struct TimelineEntry {
     /// Seconds since every service answered for the first time.
     pub t_s: f64,
-    /// The service that says so.
+    /// The service that says so; of `restarted` the one that was.
     pub service: &'static str,
     /// Kind of the event.
     pub event: &'static str,
@@ -48,6 +47,8 @@ pub struct TimelineEntry {
 /// A step of the decision model, with its names.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct NamedStep {
+    /// From 1, since the supervisor started.
+    pub number: u64,
     /// Steps of one belief have one number: it began anew between others.
     pub belief: u32,
     /// The action.
@@ -150,9 +151,9 @@ impl Timeline {
     }
 
     /// Adds that a service was started again.
-    pub fn add_restart(&mut self, service: ServiceName) {
+    pub fn add_restart(&mut self, service: ServiceName, t_ns: u64) {
         let restart = Event {
-            t_ns: Monotonic.now_ns(),
+            t_ns,
             kind: EventKind::Restarted as u32,
             ..Event::default()
         };
@@ -288,6 +289,11 @@ fn blind_s<'a>(
     sums
 }
 
+/// What an event carries, in words.
+fn text_of(carried: Option<impl fmt::Display>) -> String {
+    carried.map_or_else(|| "?".to_owned(), |it| it.to_string())
+}
+
 /// Gives names to what events are about.
 struct Namer {
     nodes: Vec<String>,
@@ -343,6 +349,7 @@ impl Namer {
     fn step(&self, event: &Event) -> Option<NamedStep> {
         let name = |names: &[String], at: usize| names.get(at).cloned();
         (event.kind == EventKind::Step as u32).then(|| NamedStep {
+            number: event.p as u64,
             belief: (event.value >> 32) as u32,
             action: name(&self.actions, event.what as usize).unwrap_or_else(|| "?".to_owned()),
             observation: name(&self.observations, event.value as u32 as usize),
@@ -439,12 +446,8 @@ impl Namer {
                     _ => action.to_owned(),
                 }
             }
-            EventKind::Weighed => self
-                .weighing(event)
-                .map_or_else(|| "?".into(), |weighing| weighing.to_string()),
-            EventKind::Step => self
-                .step(event)
-                .map_or_else(|| "?".into(), |step| step.to_string()),
+            EventKind::Weighed => text_of(self.weighing(event)),
+            EventKind::Step => text_of(self.step(event)),
             EventKind::Particles => format!("{} of {}", event.what, event.value),
             EventKind::Watchdog => {
                 let found = WatchdogFinding::from_repr(event.what);

@@ -115,7 +115,7 @@ impl SupervisorStage {
         } = self.step;
         if count != self.steps_reported {
             let value = u64::from(observation) | belief << 32;
-            health.event(now_ns, EventKind::Step, action, 0.0, value);
+            health.event(now_ns, EventKind::Step, action, count as f64, value);
             self.steps_reported = count;
         }
         let AlarmCount { stands, count } = self.alarm;
@@ -188,7 +188,7 @@ impl Stage for SupervisorStage {
             count: action.alarm_count,
         };
         self.step = ModelStep {
-            belief: action.belief_count,
+            belief: action.step_belief,
             count: action.step_count,
             action: action.step_action,
             observation: action.step_observation,

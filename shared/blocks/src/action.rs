@@ -73,9 +73,9 @@ block! {
         pub alarm_count: u32,
         /// Why nothing is seen: a [`crate::Blindness`]; 0 while something is.
         pub blind: u32,
-        /// Counts beliefs that began anew: at a reset, and at a new run that is not the success of
-        /// an action.
-        pub belief_count: u64,
+        /// Which belief the model's last step was of: how many had begun anew before, at a reset or
+        /// at a new run that was not the success of an action.
+        pub step_belief: u64,
         /// Steps of the decision model so far, with symptoms; 0 with faults, whose evidence is no
         /// observation of the model.
         pub step_count: u64,

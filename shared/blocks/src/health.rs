@@ -117,9 +117,9 @@ pub enum EventKind {
     ContextChanged = 35,
     /// What the last decision was weighed from: see [`crate::Weighing`].
     Weighed = 36,
-    /// A step of the decision model, with symptoms. `what`: its action; `value`: its observation,
-    /// `u32::MAX` for a set of symptoms that the model does not have, + 2^32 x how many beliefs
-    /// began anew before.
+    /// A step of the decision model, with symptoms. `what`: its action; `p`: its number, from 1;
+    /// `value`: its observation, `u32::MAX` for a set of symptoms that the model does not have,
+    /// + 2^32 x how many beliefs had begun anew before.
     Step = 37,
     /// A service was started again. Only the launcher records it.
     Restarted = 38,

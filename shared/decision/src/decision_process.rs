@@ -56,6 +56,8 @@ pub(crate) struct Instruction {
 /// A step of the decision model.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Step {
+    /// `belief_count` when it was made.
+    pub belief: u64,
     pub action: usize,
     /// `None` for what the model cannot observe.
     pub observation: Option<usize>,
@@ -197,7 +199,7 @@ impl DecisionProcess {
         action.curvature_offset = 0.0;
         action.log_evidence = self.log_evidence;
         action.impossible_count = self.impossible_count;
-        action.belief_count = self.belief_count;
+        action.step_belief = self.step.belief;
         action.step_count = self.step_count;
         action.step_action = self.step.action as u32;
         action.step_observation = self.step.observation.map_or(u32::MAX, |z| z as u32);

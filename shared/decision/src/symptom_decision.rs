@@ -199,6 +199,7 @@ impl SymptomDecision {
         let observation = self.observations.index(set);
         process.step_count += 1;
         process.step = Step {
+            belief: process.belief_count,
             action,
             observation,
         };

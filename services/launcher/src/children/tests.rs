@@ -100,6 +100,7 @@ fn a_service_that_is_killed_is_started_again_and_all_are_stopped() {
     assert_eq!(children.dead().count(), 0);
     let restarts = ServiceName::ALL.map(|name| children.restarts(name));
     assert_eq!(restarts, [0, 1, 0, 0]);
+    assert_eq!(graph.events(EventKind::Restarted), [""]);
 
     children.stop();
     for service in &mut children.services {

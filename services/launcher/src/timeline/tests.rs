@@ -165,14 +165,18 @@ fn a_change_that_is_no_fault_is_told_by_its_name() {
 fn steps_of_the_decision_model_are_for_programs_alone() {
     let mut timeline = timeline();
     timeline.begin(10 * S);
-    let step = |value| event(12, EventKind::Step, 1, value);
+    let step = |value| Event {
+        p: 7.0,
+        ..event(12, EventKind::Step, 1, value)
+    };
     timeline.add(ServiceName::Supervisor, &step(3 << 32));
     timeline.add(ServiceName::Supervisor, &step(u64::from(u32::MAX)));
     let entries = timeline.entries();
     let action = timeline.namer.actions[1].as_str();
     let observation = timeline.namer.observations[0].as_str();
     let named = entries[0].step.as_ref().unwrap();
-    assert_eq!((named.belief, named.action.as_str()), (3, action));
+    assert_eq!((named.number, named.belief), (7, 3));
+    assert_eq!(named.action, action);
     assert_eq!(named.observation.as_deref(), Some(observation));
     assert_eq!(entries[0].what, format!("{action} {observation}"));
     assert_eq!(entries[1].step.as_ref().unwrap().observation, None);

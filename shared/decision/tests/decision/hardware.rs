@@ -184,8 +184,10 @@ fn a_run_that_begins_with_the_help_that_came_is_a_step_of_the_task_and_any_other
     let blocked = |robot: &Navigation| ["NNP", "DE", "CROWD"].map(|it| robot.p(it)).iter().sum();
     let (before, steps): (f64, u64) = (blocked(&helped), helped.action.step_count);
     assert!(before > 0.3, "{before}");
+    let belief = helped.action.step_belief;
     helped.ended(ActionOutcome::Succeeded, 0);
     assert_eq!(helped.action.step_count, steps + 1);
+    assert_eq!(helped.action.step_belief, belief, "the task goes on");
     assert_eq!(helped.action.run_id, 2);
     let left: f64 = blocked(&helped);
     assert!(
@@ -196,6 +198,10 @@ fn a_run_that_begins_with_the_help_that_came_is_a_step_of_the_task_and_any_other
     let mut another = called();
     another.cycle(0);
     assert!((another.p("NNP") - fresh.p("NNP")).abs() < 0.01);
+    let steps = another.action.step_count;
+    another.cycle(Symptoms::EPM);
+    assert_eq!(another.action.step_count, steps + 1);
+    assert_eq!(another.action.step_belief, belief + 1, "it began anew");
 }
 
 #[test]

@@ -9,14 +9,18 @@ use vigil_missions::learning::{Record, file};
 use vigil_pomdp::Pomdp;
 use vigil_terminal::{CommandError, Outcome};
 
-use super::{load, print, save};
+use super::{FILE_BYTES_MAX, load, print, save};
+
+/// Layout of a run's document.
+const RUN_VERSION: u32 = 1;
 
 /// Gathers the decision model's steps of recorded runs, as `vigil pomdp learn` reads them.
 ///
 /// A RUN is what `scripts/up --json` prints at its end. Steps are recorded by graphs that decide by
 /// symptoms. A mission ends where the belief began anew: at a reset, at a run that no action
-/// brought about, when the supervisor was started again. A step whose symptoms MODEL does not have
-/// is left out, and counted.
+/// brought about, when the supervisor was started again. From a step on that is missing, or whose
+/// symptoms MODEL does not have, the rest of a mission is left out, and counted. Rewards are not
+/// recorded: `learn` takes such missions with --world or --unchecked.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Recorded runs.
@@ -36,9 +40,9 @@ pub struct Args {
 /// What is needed of a run's document.
 #[derive(Debug, Deserialize)]
 struct Run {
+    schema_version: u32,
     graph: String,
     events: Vec<Event>,
-    events_overwritten: u64,
 }
 
 #[derive(Debug, Deserialize)]
@@ -50,6 +54,7 @@ struct Event {
 
 #[derive(Debug, Deserialize)]
 struct Step {
+    number: u64,
     belief: u32,
     action: String,
     observation: Option<String>,
@@ -61,10 +66,8 @@ struct Document {
     runs: usize,
     missions: usize,
     steps: usize,
-    /// Steps whose symptoms the model does not have.
+    /// Steps after one that is missing or that the model cannot observe.
     left_out: usize,
-    /// Events that the launcher could not read in time; steps may be among them.
-    events_overwritten: u64,
     out: String,
 }
 
@@ -84,7 +87,6 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let mut missions = Vec::new();
     for path in &args.runs {
         let run = read(path)?;
-        document.events_overwritten += run.events_overwritten;
         let left_out = gather(&run, &model, &mut missions)
             .map_err(|problem| CommandError::usage(format!("{}: {problem}", path.display())))?;
         document.left_out += left_out;
@@ -95,7 +97,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     document.missions = missions.len();
     document.steps = missions.iter().map(Record::steps).sum();
     if document.steps == 0 {
-        let problem = "no step of the model: allowed are runs of graphs that decide by symptoms";
+        let problem = "no mission whose first step is there and is one of the model";
         return Err(CommandError::usage(problem));
     }
     save(&args.out, lines(&model, &graphs, &missions)?)?;
@@ -108,28 +110,43 @@ fn read(path: &Path) -> Result<Run, CommandError> {
         let allowed = "allowed is what 'scripts/up --json' prints";
         CommandError::usage(format!("{}: {problem}; {allowed}", path.display()))
     };
+    let size = fs::metadata(path).map_err(|error| refused(&error))?.len();
+    if size > FILE_BYTES_MAX {
+        let problem = format!("{size} bytes, at most {FILE_BYTES_MAX}");
+        return Err(refused(&problem));
+    }
     let text = fs::read_to_string(path).map_err(|error| refused(&error))?;
-    serde_json::from_str(&text).map_err(|error| refused(&error))
+    let run: Run = serde_json::from_str(&text).map_err(|error| refused(&error))?;
+    if run.schema_version != RUN_VERSION {
+        return Err(refused(&format!("schema_version {}", run.schema_version)));
+    }
+    if !run.events.iter().any(|event| event.step.is_some()) {
+        return Err(refused(&"no step: the graph does not decide by symptoms"));
+    }
+    Ok(run)
 }
 
 /// Adds a run's missions; the number of steps that were left out.
 fn gather(run: &Run, model: &Pomdp, missions: &mut Vec<Record>) -> Result<usize, String> {
     let mut left_out = 0;
-    let mut belief = None;
+    let (mut belief, mut next, mut is_whole) = (None, 1, true);
     for event in &run.events {
-        // Its next process counts beliefs from 0 again.
+        // Its next process counts anew.
         if event.service == "supervisor" && event.event == "restarted" {
-            belief = None;
+            (belief, next) = (None, 1);
         }
         let Some(step) = &event.step else {
             continue;
         };
         if belief.replace(step.belief) != Some(step.belief) {
             missions.push(Record::default());
+            is_whole = true;
         }
+        is_whole &= step.number == next;
+        next = step.number + 1;
         let action = file::index_of(model.actions(), &step.action, "action")?;
-        let Some(observation) = &step.observation else {
-            left_out += 1;
+        let Some(observation) = step.observation.as_ref().filter(|_| is_whole) else {
+            (is_whole, left_out) = (false, left_out + 1);
             continue;
         };
         let observation = file::index_of(model.observations(), observation, "observation")?;
@@ -160,19 +177,13 @@ fn text_of(document: &Document) -> String {
         missions,
         steps,
         left_out,
-        events_overwritten,
         out,
         ..
     } = document;
     let mut text = format!("{runs} runs, {missions} missions, {steps} steps: {out}");
     if *left_out > 0 {
         text.push_str(&format!(
-            "\n{left_out} steps left out: the model does not have their symptoms"
-        ));
-    }
-    if *events_overwritten > 0 {
-        text.push_str(&format!(
-            "\n{events_overwritten} events were overwritten: steps may be missing"
+            "\n{left_out} steps left out: they follow one that is missing or not the model's"
         ));
     }
     text
