@@ -444,8 +444,8 @@ VIGIL_ASSERT(offsetof(vigil_fault_belief, identifying) == 2744);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, degenerate_count) == 2748);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, size_kind) == 2752);
 
-#define VIGIL_ACTION_SCHEMA 0xdf8d467eb9b7f344ull
-#define VIGIL_ACTION_TYPE_NAME "vigil.Action.v1.df8d467eb9b7f344"
+#define VIGIL_ACTION_SCHEMA 0xb468250c1c1ff74dull
+#define VIGIL_ACTION_TYPE_NAME "vigil.Action.v1.b468250c1c1ff74d"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -503,8 +503,8 @@ typedef struct {
   uint32_t alarm_count;
   /* Why nothing is seen: a Blindness; 0 while something is. */
   uint32_t blind;
-  /* Counts beliefs that began anew: at a reset, and at a new run that is not the success of an action. */
-  uint64_t belief_count;
+  /* Which belief the model's last step was of: how many had begun anew before, at a reset or at a new run that was not the success of an action. */
+  uint64_t step_belief;
   /* Steps of the decision model so far, with symptoms; 0 with faults, whose evidence is no observation of the model. */
   uint64_t step_count;
   /* Action of the model's last step. */
@@ -541,7 +541,7 @@ VIGIL_ASSERT(offsetof(vigil_action, alarm) == 964);
 VIGIL_ASSERT(offsetof(vigil_action, alarm_t_capture_ns) == 968);
 VIGIL_ASSERT(offsetof(vigil_action, alarm_count) == 976);
 VIGIL_ASSERT(offsetof(vigil_action, blind) == 980);
-VIGIL_ASSERT(offsetof(vigil_action, belief_count) == 984);
+VIGIL_ASSERT(offsetof(vigil_action, step_belief) == 984);
 VIGIL_ASSERT(offsetof(vigil_action, step_count) == 992);
 VIGIL_ASSERT(offsetof(vigil_action, step_action) == 1000);
 VIGIL_ASSERT(offsetof(vigil_action, step_observation) == 1004);

@@ -494,8 +494,8 @@ assert FaultBelief.size_kind.offset == 2752
 
 
 class Action(ctypes.LittleEndianStructure):
-    SCHEMA = 0xDF8D467EB9B7F344
-    TYPE_NAME = "vigil.Action.v1.df8d467eb9b7f344"
+    SCHEMA = 0xB468250C1C1FF74D
+    TYPE_NAME = "vigil.Action.v1.b468250c1c1ff74d"
 
     @staticmethod
     def type_name():
@@ -558,8 +558,8 @@ class Action(ctypes.LittleEndianStructure):
         ("alarm_count", ctypes.c_uint32),
         # Why nothing is seen: a Blindness; 0 while something is.
         ("blind", ctypes.c_uint32),
-        # Counts beliefs that began anew: at a reset, and at a new run that is not the success of an action.
-        ("belief_count", ctypes.c_uint64),
+        # Which belief the model's last step was of: how many had begun anew before, at a reset or at a new run that was not the success of an action.
+        ("step_belief", ctypes.c_uint64),
         # Steps of the decision model so far, with symptoms; 0 with faults, whose evidence is no observation of the model.
         ("step_count", ctypes.c_uint64),
         # Action of the model's last step.
@@ -598,7 +598,7 @@ assert Action.alarm.offset == 964
 assert Action.alarm_t_capture_ns.offset == 968
 assert Action.alarm_count.offset == 976
 assert Action.blind.offset == 980
-assert Action.belief_count.offset == 984
+assert Action.step_belief.offset == 984
 assert Action.step_count.offset == 992
 assert Action.step_action.offset == 1000
 assert Action.step_observation.offset == 1004
