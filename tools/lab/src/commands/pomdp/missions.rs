@@ -1,6 +1,5 @@
 //! `vigil pomdp missions`: missions for `learn` from what graphs have recorded.
 
-use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -9,7 +8,7 @@ use vigil_missions::learning::{Record, file};
 use vigil_pomdp::Pomdp;
 use vigil_terminal::{CommandError, Outcome};
 
-use super::{FILE_BYTES_MAX, load, print, save};
+use super::{bytes_of, load, print, save};
 
 /// Layout of a run's document.
 const RUN_VERSION: u32 = 1;
@@ -110,13 +109,7 @@ fn read(path: &Path) -> Result<Run, CommandError> {
         let allowed = "allowed is what 'scripts/up --json' prints";
         CommandError::usage(format!("{}: {problem}; {allowed}", path.display()))
     };
-    let size = fs::metadata(path).map_err(|error| refused(&error))?.len();
-    if size > FILE_BYTES_MAX {
-        let problem = format!("{size} bytes, at most {FILE_BYTES_MAX}");
-        return Err(refused(&problem));
-    }
-    let text = fs::read_to_string(path).map_err(|error| refused(&error))?;
-    let run: Run = serde_json::from_str(&text).map_err(|error| refused(&error))?;
+    let run: Run = serde_json::from_slice(&bytes_of(path)?).map_err(|error| refused(&error))?;
     if run.schema_version != RUN_VERSION {
         return Err(refused(&format!("schema_version {}", run.schema_version)));
     }
@@ -143,7 +136,7 @@ fn gather(run: &Run, model: &Pomdp, missions: &mut Vec<Record>) -> Result<usize,
             is_whole = true;
         }
         is_whole &= step.number == next;
-        next = step.number + 1;
+        next = step.number.saturating_add(1);
         let action = file::index_of(model.actions(), &step.action, "action")?;
         let Some(observation) = step.observation.as_ref().filter(|_| is_whole) else {
             (is_whole, left_out) = (false, left_out + 1);

@@ -94,8 +94,24 @@ fn save(path: &Path, content: impl AsRef<[u8]>) -> Result<(), CommandError> {
     written.map_err(|error| CommandError::failure(format!("{}: {error}", path.display())))
 }
 
-/// Largest model file, bytes: the readers' own limit.
+/// Largest file, bytes: the model readers' own limit.
 const FILE_BYTES_MAX: u64 = 256 << 20;
+
+/// Reads a file that is not too large.
+///
+/// # Errors
+/// The file's name, and the system's or what is allowed.
+fn bytes_of(path: &Path) -> Result<Vec<u8>, CommandError> {
+    let wrong = |problem: &dyn std::fmt::Display| {
+        CommandError::usage(format!("{}: {problem}", path.display()))
+    };
+    let size = std::fs::metadata(path).map_err(|e| wrong(&e))?.len();
+    if size > FILE_BYTES_MAX {
+        let problem = format!("{size} bytes, allowed are {FILE_BYTES_MAX}");
+        return Err(wrong(&problem));
+    }
+    std::fs::read(path).map_err(|e| wrong(&e))
+}
 
 /// Reads a model: APPL's format if the name ends in `.pomdpx`, otherwise Cassandra's.
 ///
@@ -105,12 +121,7 @@ fn load(path: &Path) -> Result<Pomdp, CommandError> {
     let wrong = |problem: &dyn std::fmt::Display| {
         CommandError::usage(format!("{}: {problem}", path.display()))
     };
-    let size = std::fs::metadata(path).map_err(|e| wrong(&e))?.len();
-    if size > FILE_BYTES_MAX {
-        let problem = format!("{size} bytes, allowed are {FILE_BYTES_MAX}");
-        return Err(wrong(&problem));
-    }
-    let bytes = std::fs::read(path).map_err(|e| wrong(&e))?;
+    let bytes = bytes_of(path)?;
     // Old files hold comments in other encodings; names are plain.
     let text = String::from_utf8_lossy(&bytes);
     let is_xml = path
