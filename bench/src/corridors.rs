@@ -29,15 +29,17 @@ pub use exception::{Exception, Group};
 pub use ladder::EscalationSettings;
 pub use plan::CorridorPlan;
 pub use prices::{CorridorFile, CorridorPrices};
-pub use report::{document, lines, say, shortfalls};
+pub use report::{compare, document, lines, say, shortfalls};
 pub use score::CorridorScore;
 pub use sweep::mean_points;
 
 use std::error::Error;
 
+use vigil_setup::graph_file::Navigation;
 use vigil_setup::{Setup, load_graph};
 
 use crate::missions::{MissionFile, Prices};
+use crate::variation::Variation;
 
 /// Longest mission, s.
 pub const LIMIT_S: f64 = 300.0;
@@ -49,6 +51,10 @@ pub const HELP_S: f64 = crate::missions::HELP_S;
 pub struct CorridorGraph {
     /// The configuration; its corridor is replaced by that of each mission.
     pub setup: Setup,
+    /// The settings of navigation, and a corridor that is replaced.
+    shipped: Navigation,
+    /// What is changed of it and of its missions.
+    variation: Variation,
     /// Prices and rules.
     pub file: CorridorFile,
     /// Prices of what is driven with a fault.
@@ -56,24 +62,39 @@ pub struct CorridorGraph {
 }
 
 impl CorridorGraph {
-    /// Reads the prices and `corridor-people.toml`; frames come `rate_hz` times a second, and
-    /// `decision`, if given, stands for its decision model.
+    /// Reads the prices and `corridor-people.toml`; `decision`, if given, stands for its decision
+    /// model.
     ///
     /// # Errors
     /// A configuration that is refused.
-    pub fn read(rate_hz: f64, decision: Option<&str>) -> Result<Self, Box<dyn Error>> {
+    pub fn read(variation: Variation, decision: Option<&str>) -> Result<Self, Box<dyn Error>> {
         let path = crate::root().join("config/corridor-people.toml");
         let setup = load_graph(&path, |file| {
-            file.graph.rate_hz = rate_hz;
+            variation.change_graph(file);
             if let Some(decision) = decision {
                 file.files.decision = decision.into();
             }
         })?;
         Ok(Self {
+            shipped: setup.file.navigation.clone().ok_or("no corridor")?,
+            variation,
             setup,
             file: CorridorFile::read()?,
             faults: MissionFile::read()?.prices,
         })
+    }
+
+    /// The mission of a seed.
+    #[must_use]
+    pub fn plan(&self, seed: u64) -> CorridorPlan {
+        CorridorPlan::new(&self.shipped, &self.variation, seed)
+    }
+
+    /// So many missions, from a seed on.
+    #[must_use]
+    pub fn plans(&self, count: u64, first_seed: u64) -> Vec<CorridorPlan> {
+        let seeds = first_seed..first_seed + count;
+        seeds.map(|seed| self.plan(seed)).collect()
     }
 
     /// The commanders, Vigil first.

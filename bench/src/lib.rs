@@ -21,6 +21,7 @@ pub mod run_time;
 pub mod simulated;
 pub mod taped_wheels;
 pub mod tuning;
+pub mod variation;
 
 /// What the question of this name ends with: 0, or 1 and the reason.
 pub fn ended(name: &str, result: Result<(), Box<dyn Error>>) -> ExitCode {

@@ -35,10 +35,11 @@ pub use kind::Kind;
 pub use order::{action_block, order};
 pub use plan::{Plan, drawn_soil};
 pub use prices::{MissionFile, Prices};
-pub use report::{document, lines, say, shortfalls};
+pub use report::{compare, document, lines, say, shortfalls};
 pub use rules::{Rule, RuleInput, RuleOutput, Rules};
 pub use score::{MEASURES, Measure, POINTS, Score, measure, price_1_m};
 pub use sweep::mean_points;
+pub use table::Interval;
 
 use std::error::Error;
 use std::path::Path;
@@ -46,6 +47,8 @@ use std::path::Path;
 use vigil_robot::Injection;
 use vigil_robot::injection::Change;
 use vigil_setup::{Setup, load_graph};
+
+use crate::variation::Variation;
 
 /// Longest mission, s.
 pub const LIMIT_S: f64 = 300.0;
@@ -61,19 +64,20 @@ pub struct ShippedGraph {
     pub heuristic: Setup,
     /// Prices, shares and rules.
     pub missions: MissionFile,
+    /// What is changed of it and of its missions.
+    pub variation: Variation,
 }
 
 impl ShippedGraph {
-    /// Reads a graph file, of `config/` if the path is relative, and `bench/missions.toml`; frames
-    /// come `rate_hz` times a second.
+    /// Reads a graph file, of `config/` if the path is relative, and `bench/missions.toml`.
     ///
     /// # Errors
     /// A configuration that is refused.
-    pub fn read(graph: &Path, rate_hz: f64) -> Result<Self, Box<dyn Error>> {
+    pub fn read(graph: &Path, variation: Variation) -> Result<Self, Box<dyn Error>> {
         let path = crate::root().join("config").join(graph);
-        let setup = load_graph(&path, |file| file.graph.rate_hz = rate_hz)?;
+        let setup = load_graph(&path, |file| variation.change_graph(file))?;
         let heuristic = load_graph(&path, |file| {
-            file.graph.rate_hz = rate_hz;
+            variation.change_graph(file);
             file.supervisor.policy = "qmdp".to_owned();
             file.supervisor.policy_file = None;
         })?;
@@ -81,7 +85,16 @@ impl ShippedGraph {
             setup,
             heuristic,
             missions: MissionFile::read()?,
+            variation,
         })
+    }
+
+    /// So many missions of every kind, from a seed on.
+    #[must_use]
+    pub fn plans(&self, per_kind: u64, first_seed: u64) -> Vec<Plan> {
+        let mut plans = Plan::of_all_kinds(per_kind, first_seed);
+        plans.iter_mut().for_each(|plan| plan.vary(&self.variation));
+        plans
     }
 
     /// The commanders, Vigil first.

@@ -24,6 +24,7 @@ use std::time::Instant;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::machine;
+use vigil_bench::variation::{Comparison, say_comparisons, without_lead};
 use vigil_evaluation::parallel::in_parallel;
 
 /// Missions between two lines of progress.
@@ -37,12 +38,12 @@ pub struct MissionArgs {
     /// Seed of the first.
     #[arg(long, value_name = "S", default_value_t = 1)]
     first_seed: u64,
-    /// Rate of the frames, Hz.
-    #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = from_zero)]
-    rate: f64,
     /// Tune the rules instead, on missions of their own, from where they stand.
     #[arg(long)]
     sweep: bool,
+    /// Compare Vigil and rules in each variation of `bench/variations.toml` instead.
+    #[arg(long, conflicts_with = "sweep")]
+    vary: bool,
     /// Print one JSON document, archive nothing.
     #[arg(long)]
     json: bool,
@@ -68,7 +69,6 @@ impl MissionArgs {
         say: impl FnOnce(&mut Archive),
     ) -> Result<(), Box<dyn Error>> {
         document["machine"] = machine::facts();
-        document["rate_hz"] = json!(self.rate);
         document["wall_s"] = json!(began.elapsed().as_secs_f64());
         if self.json {
             println!("{document:#}");
@@ -82,6 +82,29 @@ impl MissionArgs {
         say(&mut archive);
         archive.close()?;
         Ok(())
+    }
+
+    /// Keeps what was compared under variations, and demands that Vigil leads in each.
+    fn keep_comparisons(
+        &self,
+        question: &str,
+        found: &[Comparison],
+        began: Instant,
+        head: &str,
+        harm: &str,
+    ) -> Result<(), Box<dyn Error>> {
+        let short = without_lead(found);
+        let of_each: Vec<Value> = found.iter().map(Comparison::document).collect();
+        let document = json!({"variations": of_each, "short": short});
+        self.keep(question, document, began, None, |archive| {
+            archive.say(head);
+            say_comparisons(archive, found, harm);
+            archive.say("");
+            short
+                .iter()
+                .for_each(|line| archive.say(&format!("- Short: {line}.")));
+        })?;
+        demand_none(&short)
     }
 }
 
@@ -110,11 +133,4 @@ fn demand_none(missed: &[String]) -> Result<(), Box<dyn Error>> {
         0 => Ok(()),
         count => Err(format!("{count} bars are missed").into()),
     }
-}
-
-/// A finite number of at least 0.
-fn from_zero(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok();
-    let number = number.filter(|n: &f64| n.is_finite() && *n >= 0.0);
-    number.ok_or_else(|| "allowed is a number from 0".to_owned())
 }

@@ -190,12 +190,12 @@ fn ride(
 mod tests {
     use super::*;
     use crate::corridors::Exception;
+    use crate::variation::Variation;
 
     #[test]
     fn a_ladder_goes_through_an_opening_to_its_goal() {
-        let graph = CorridorGraph::read(100.0, None).unwrap();
-        let shipped = graph.setup.file.navigation.clone().unwrap();
-        let mut plans = (0..).map(|seed| CorridorPlan::new(&shipped, seed));
+        let graph = CorridorGraph::read(Variation::default(), None).unwrap();
+        let mut plans = (0..).map(|seed| graph.plan(seed));
         // Smaller ones leave the middle of the corridor free; another way would do as well.
         let blocks = |plan: &CorridorPlan| {
             let navigation = &plan.navigation;

@@ -5,8 +5,9 @@ use rand_pcg::Pcg64Mcg;
 use vigil_setup::graph_file::{Navigation, Obstacle, Simulator, Trouble, TroubleKind};
 
 use super::exception::{Exception, Group};
-use super::layout::Layout;
+use super::layout::{HALF_M, Layout};
 use crate::missions::{Cause, drawn_soil, drawn_wheel, encoder, stuck};
+use crate::variation::Variation;
 
 /// Share of missions without an exception, and of those with two.
 const NOTHING: f64 = 0.15;
@@ -15,12 +16,13 @@ const TWO: f64 = 0.3;
 const BEGINS_S: std::ops::Range<f64> = 3.0..15.0;
 /// How long people stay after the robot has come to them, s.
 const STAY_S: std::ops::Range<f64> = 5.0..60.0;
-/// What fills a corridor: a disc of this radius, m, and how far it is from the middle at most.
-const FILLS_M: f64 = 1.25;
+/// What fills a corridor: a disc of a radius this much, m, above half of its width, which can be
+/// passed on no side, and how far it is from the middle at most.
+const FILLS_M: f64 = 0.05;
 const ASIDE_M: f64 = 0.2;
-/// What can be passed: its radius and its distance from the middle, m.
+/// What can be passed: its radius and the distance of its middle from a wall, m.
 const PASSED_M: std::ops::Range<f64> = 0.4..0.6;
-const PASSED_ASIDE_M: f64 = 0.9;
+const FROM_WALL_M: f64 = 0.3;
 /// A person's radius, and how far three people abreast stand apart, m.
 const PERSON_M: f64 = 0.25;
 const ABREAST_M: f64 = 0.7;
@@ -60,12 +62,14 @@ pub struct CorridorPlan {
 }
 
 impl CorridorPlan {
-    /// The mission of a seed, with the settings of `shipped`.
+    /// The mission of a seed, with the settings of `shipped` and what `variation` changes.
     #[must_use]
-    pub fn new(shipped: &Navigation, seed: u64) -> Self {
+    pub fn new(shipped: &Navigation, variation: &Variation, seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed ^ 0xc022_1d02);
-        let layout = Layout::drawn(shipped, &mut rng);
-        let simulator = drawn_soil(&mut rng);
+        let mut layout = Layout::drawn(shipped, variation.corridor_half_m(HALF_M), &mut rng);
+        layout.navigation.speed_m_s *= variation.speed_scale();
+        let mut simulator = drawn_soil(&mut rng);
+        variation.change_world(&mut simulator);
         let exceptions = exceptions(&mut rng);
         let mut plan = Self {
             seed,
@@ -79,13 +83,6 @@ impl CorridorPlan {
             plan.exceptions.push(exception);
         }
         plan
-    }
-
-    /// So many missions, from a seed on.
-    #[must_use]
-    pub fn many(shipped: &Navigation, count: u64, first_seed: u64) -> Vec<Self> {
-        let seeds = first_seed..first_seed + count;
-        seeds.map(|seed| Self::new(shipped, seed)).collect()
     }
 
     /// What goes wrong, in words.
@@ -169,7 +166,7 @@ impl CorridorPlan {
         let y_m = rng.random_range(-ASIDE_M..ASIDE_M);
         self.navigation.obstacle.push(Obstacle {
             y_m,
-            ..obstacle(x_m, FILLS_M)
+            ..obstacle(x_m, layout.half_m + FILLS_M)
         });
     }
 
@@ -188,7 +185,8 @@ impl CorridorPlan {
 
     fn stand_aside(&mut self, layout: &Layout, rng: &mut Pcg64Mcg) {
         let x_m = place(layout, rng);
-        let y_m = if rng.random_bool(0.5) { 1.0 } else { -1.0 } * PASSED_ASIDE_M;
+        let side = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
+        let y_m = side * (layout.half_m - FROM_WALL_M);
         let radius_m = rng.random_range(PASSED_M);
         self.navigation.obstacle.push(Obstacle {
             y_m,
@@ -255,9 +253,8 @@ mod tests {
 
     #[test]
     fn missions_are_drawn_by_their_seed_and_their_graph_is_one_that_loads() {
-        let graph = CorridorGraph::read(100.0, None).unwrap();
-        let shipped = graph.setup.file.navigation.clone().unwrap();
-        let plans = CorridorPlan::many(&shipped, 300, 9);
+        let graph = CorridorGraph::read(Variation::default(), None).unwrap();
+        let plans = graph.plans(300, 9);
         let share = |group| plans.iter().filter(|it| it.group() == group).count() as f64 / 300.0;
         // A share of p has a standard error of less than .03.
         assert!(
@@ -266,17 +263,30 @@ mod tests {
             share(Group::Nothing)
         );
         assert!((share(Group::Two) - TWO).abs() < 0.1);
-        for plan in &plans {
-            let mut setup = graph.setup.clone();
-            setup.file.navigation = Some(plan.navigation.clone());
-            setup.file.simulator = plan.simulator.clone();
-            assert!(vigil_sensor_sim::assemble(&setup, &[]).is_ok());
-            for change in plan.hardware.iter().map(|it| &it.change) {
-                vigil_robot::Injection::parse_change(change, &setup.robot).unwrap();
+        plans.iter().for_each(|plan| demand_loads(&graph, plan));
+        assert_eq!(graph.plan(9).navigation, plans[0].navigation);
+        assert_ne!(graph.plan(9).navigation, plans[1].navigation);
+    }
+
+    fn demand_loads(graph: &CorridorGraph, plan: &CorridorPlan) {
+        let mut setup = graph.setup.clone();
+        setup.file.navigation = Some(plan.navigation.clone());
+        setup.file.simulator = plan.simulator.clone();
+        assert!(vigil_sensor_sim::assemble(&setup, &[]).is_ok());
+        for change in plan.hardware.iter().map(|it| &it.change) {
+            vigil_robot::Injection::parse_change(change, &setup.robot).unwrap();
+        }
+    }
+
+    #[test]
+    fn every_variation_meets_the_same_exceptions_in_corridors_that_load() {
+        let shipped = CorridorGraph::read(Variation::default(), None).unwrap();
+        for variation in Variation::read_all().unwrap() {
+            let graph = CorridorGraph::read(variation, None).unwrap();
+            for (plan, other) in shipped.plans(30, 9).iter().zip(graph.plans(30, 9)) {
+                assert_eq!(plan.exceptions, other.exceptions);
+                demand_loads(&graph, &other);
             }
         }
-        let again = CorridorPlan::new(&shipped, 9);
-        assert_eq!(again.navigation, plans[0].navigation);
-        assert_ne!(again.navigation, plans[1].navigation);
     }
 }

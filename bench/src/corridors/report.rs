@@ -6,10 +6,11 @@ use vigil_missions::simulation::{PairedDifference, Summary};
 use super::commander::CorridorArm;
 use super::drive::CorridorMission;
 use super::exception::Group;
-use super::score::{CorridorScore, MEASURES, POINTS};
+use super::score::{CALLS, CorridorScore, MEASURES, POINTS, TOUCHES};
 use super::{HELP_S, LIMIT_S};
 use crate::archive::Archive;
-use crate::missions::Measure;
+use crate::missions::{Interval, Measure};
+use crate::variation::{Commanded, Comparison};
 
 /// Largest probability of Vigil's lead, were there none.
 const P_MAX: f64 = 1e-3;
@@ -82,6 +83,36 @@ pub fn document(arms: &[CorridorArm], missions: &[CorridorMission]) -> Value {
         document["figures"][name] = table.figures(group);
     }
     document
+}
+
+/// What the missions of a variation of this name brought. Harm is how often the robot ran into
+/// something.
+#[must_use]
+pub fn compare(arms: &[CorridorArm], missions: &[CorridorMission], name: &str) -> Comparison {
+    let table = Table { arms, missions };
+    let commanded = |(at, arm): (usize, &CorridorArm)| {
+        let (points, lead) = (
+            table.mean(None, at, POINTS),
+            table.against(None, at, POINTS),
+        );
+        Commanded {
+            name: arm.name(),
+            points: Interval {
+                mean: points.mean,
+                half_width: points.half_width,
+            },
+            vigil_less: Interval {
+                mean: lead.difference,
+                half_width: lead.half_width,
+            },
+            calls: table.mean(None, at, CALLS).mean,
+            harm: table.mean(None, at, TOUCHES).mean,
+        }
+    };
+    Comparison {
+        name: name.to_owned(),
+        commanders: arms.iter().enumerate().map(commanded).collect(),
+    }
 }
 
 /// One line of CSV per mission and commander, with a head.
@@ -184,12 +215,12 @@ pub fn shortfalls(arms: &[CorridorArm], missions: &[CorridorMission]) -> Vec<Str
 mod tests {
     use super::*;
     use crate::corridors::{CorridorGraph, CorridorPlan};
+    use crate::variation::Variation;
 
     #[test]
     fn the_bar_is_judged_by_the_paired_difference() {
-        let graph = CorridorGraph::read(100.0, None).unwrap();
+        let graph = CorridorGraph::read(Variation::default(), None).unwrap();
         let arms = graph.arms();
-        let shipped = graph.setup.file.navigation.clone().unwrap();
         let driven = |lead: f64| -> Vec<CorridorMission> {
             let mission = |plan: CorridorPlan| {
                 let noise = (plan.seed % 3) as f64;
@@ -202,10 +233,7 @@ mod tests {
                     plan,
                 }
             };
-            CorridorPlan::many(&shipped, 30, 0)
-                .into_iter()
-                .map(mission)
-                .collect()
+            graph.plans(30, 0).into_iter().map(mission).collect()
         };
         // The differences lead - 1 + {0, 1, 2} have a standard error of .15.
         assert!(shortfalls(&arms, &driven(1.0)).is_empty());

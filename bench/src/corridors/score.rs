@@ -96,13 +96,20 @@ pub struct CorridorScore {
 /// The points, which decide.
 pub(super) const POINTS: Measure<CorridorScore> = measure("points", "points", |s| s.points, 1);
 
+/// Calls for help.
+pub(super) const CALLS: Measure<CorridorScore> = measure("calls", "calls for help", |s| s.calls, 3);
+
+/// Times that the robot ran into something.
+pub(super) const TOUCHES: Measure<CorridorScore> =
+    measure("touches", "ran into something", |s| s.touches, 3);
+
 /// What is reported of a mission; the points first.
 pub(super) const MEASURES: [Measure<CorridorScore>; 6] = [
     POINTS,
     measure("done", "came to the goal", |s| s.done, 3),
     measure("time_s", "time, s", |s| s.time_s, 1),
-    measure("calls", "calls for help", |s| s.calls, 3),
-    measure("touches", "ran into something", |s| s.touches, 3),
+    CALLS,
+    TOUCHES,
     measure("lost_m", "driven with a wrong pose, m", |s| s.lost_m, 2),
 ];
 

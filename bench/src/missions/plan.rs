@@ -6,6 +6,7 @@ use vigil_setup::graph_file::{DriveSegment, Simulator};
 
 use super::breakdown::Breakdown;
 use super::kind::Kind;
+use crate::variation::Variation;
 
 /// Metres of the path.
 const LENGTH_M: f64 = 20.0;
@@ -50,6 +51,14 @@ impl Plan {
             segments: segments(&mut rng),
             kind,
             breakdown: Breakdown::drawn(kind, LENGTH_M, &mut rng),
+        }
+    }
+
+    pub(super) fn vary(&mut self, variation: &Variation) {
+        variation.change_world(&mut self.simulator);
+        for segment in &mut self.segments {
+            segment.speed_m_s *= variation.speed_scale();
+            segment.duration_s /= variation.speed_scale();
         }
     }
 
@@ -101,10 +110,10 @@ mod tests {
 
     #[test]
     fn missions_are_as_stated_and_every_change_is_understood() {
-        let shipped = ShippedGraph::read("rover.toml".as_ref(), 100.0).unwrap();
+        let shipped = ShippedGraph::read("rover.toml".as_ref(), Variation::default()).unwrap();
         let names = shipped.setup.robot.wheels.iter().map(|w| w.name.as_str());
         assert!(names.eq(WHEELS));
-        for plan in Plan::of_all_kinds(50, 7) {
+        for plan in shipped.plans(50, 7) {
             let lengths = plan.segments.iter().map(|s| s.duration_s * s.speed_m_s);
             assert!((lengths.sum::<f64>() - LENGTH_M).abs() < 1e-9);
             assert_eq!(plan.breakdown.is_none(), plan.kind == Kind::Nothing);

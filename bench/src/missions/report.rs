@@ -5,10 +5,11 @@ use serde_json::{Value, json};
 use super::commander::Arm;
 use super::drive::Mission;
 use super::kind::Kind;
-use super::score::{MEASURES, Measure, POINTS, Score, UNSAFE};
+use super::score::{CALLS, MEASURES, Measure, POINTS, Score, UNSAFE};
 use super::table::{Interval, ODDS, Table};
 use super::{HELP_S, LIMIT_S, MissionFile};
 use crate::archive::Archive;
+use crate::variation::{Commanded, Comparison};
 
 /// Least lower bound of Vigil less a rule, for kinds whose faults are modelled, and for others.
 const MODELLED_MIN: f64 = -3.0;
@@ -30,6 +31,29 @@ pub fn document(file: &MissionFile, arms: &[Arm], missions: &[Mission]) -> Value
     document["help_s"] = json!(HELP_S);
     document["short"] = json!(shortfalls(file, arms, missions));
     document
+}
+
+/// What the missions of a variation of this name brought, weighed over the kinds. Harm is the share
+/// that ended unsafely.
+#[must_use]
+pub fn compare(file: &MissionFile, arms: &[Arm], missions: &[Mission], name: &str) -> Comparison {
+    let table = Table {
+        file,
+        arms,
+        missions,
+    };
+    let mean = |arm, measure| table.over_kinds(1.0, |kind| table.mean(kind, arm, measure));
+    let commanded = |(at, arm): (usize, &Arm)| Commanded {
+        name: arm.name(),
+        points: mean(at, POINTS),
+        vigil_less: table.over_kinds(1.0, |kind| table.against(kind, at, POINTS)),
+        calls: mean(at, CALLS).mean,
+        harm: mean(at, UNSAFE).mean,
+    };
+    Comparison {
+        name: name.to_owned(),
+        commanders: arms.iter().enumerate().map(commanded).collect(),
+    }
 }
 
 /// One line of CSV per mission and commander, with a head.
@@ -252,10 +276,11 @@ fn by_kind(table: &Table<'_>) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::missions::{Plan, ShippedGraph};
+    use crate::variation::Variation;
 
     #[test]
     fn bars_are_judged_by_the_paired_difference() {
-        let shipped = ShippedGraph::read("rover.toml".as_ref(), 100.0).unwrap();
+        let shipped = ShippedGraph::read("rover.toml".as_ref(), Variation::default()).unwrap();
         let arms = shipped.arms();
         // Points of Vigil, the three rules, Q-MDP, without, told, told at the alarm.
         let driven = |points: [f64; 8], unanswered_m: f64| -> Vec<Mission> {

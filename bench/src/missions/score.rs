@@ -157,6 +157,9 @@ pub struct Measure<S> {
 /// The points, which decide.
 pub const POINTS: Measure<Score> = measure("points", "points", |s| s.points, 1);
 
+/// Calls for help.
+pub const CALLS: Measure<Score> = measure("calls", "calls for help", |s| s.calls, 3);
+
 /// 1 for a mission that ended unsafely.
 pub const UNSAFE: Measure<Score> = measure(
     "unsafe",
@@ -183,7 +186,7 @@ pub const MEASURES: [Measure<Score>; 10] = [
     measure("off_path_max_m", "at most, m", |s| s.off_path_max_m, 3),
     measure("needless_stops", "needless stops", |s| s.needless_stops, 3),
     measure("needless_s", "so stood, s", |s| s.needless_s, 2),
-    measure("calls", "calls for help", |s| s.calls, 3),
+    CALLS,
     measure("time_s", "time, s", |s| s.time_s, 1),
     measure("done", "driven to the end", |s| s.done, 3),
     UNSAFE,

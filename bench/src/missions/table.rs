@@ -18,17 +18,19 @@ pub(super) const ODDS: [(f64, &str); 3] = [
 
 /// A mean with the half width of its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Interval {
+pub struct Interval {
+    /// Mean.
     pub mean: f64,
+    /// Half width.
     pub half_width: f64,
 }
 
 impl Interval {
-    pub(super) fn lower(self) -> f64 {
+    pub(crate) fn lower(self) -> f64 {
         self.mean - self.half_width
     }
 
-    pub(super) fn text(self, decimals: usize, is_difference: bool) -> String {
+    pub(crate) fn text(self, decimals: usize, is_difference: bool) -> String {
         let Self { mean, half_width } = self;
         match is_difference {
             true => format!("{mean:+.decimals$} ± {half_width:.decimals$}"),

@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde_json::json;
-use vigil_bench::corridors::{self, CorridorGraph, CorridorPlan, EscalationSettings};
+use vigil_bench::corridors::{self, CorridorArm, CorridorGraph, CorridorPlan, EscalationSettings};
 use vigil_bench::tuning::tune;
+use vigil_bench::variation::Variation;
 use vigil_missions::learning::file;
 
 use super::{MissionArgs, demand_none, drive_all};
@@ -26,7 +27,7 @@ pub struct Args {
     decision: Option<String>,
     /// Drive Vigil alone, and write the steps of its decision model with their true states to this
     /// file, for `vigil pomdp fit` and `learn`.
-    #[arg(long, value_name = "F", conflicts_with_all = ["sweep", "json"])]
+    #[arg(long, value_name = "F", conflicts_with_all = ["sweep", "vary", "json"])]
     record: Option<PathBuf>,
     /// Share of the decisions that are recorded in which something else is tried.
     #[arg(long, value_name = "P", default_value_t = 0.3, requires = "record")]
@@ -40,9 +41,11 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if cfg!(debug_assertions) {
         return Err("a debug build takes hours: use scripts/bench".into());
     }
-    let graph = CorridorGraph::read(args.common.rate, args.decision.as_deref())?;
-    let shipped = graph.setup.file.navigation.clone().unwrap_or_default();
-    let plans = CorridorPlan::many(&shipped, args.missions, args.common.first_seed());
+    if args.common.vary {
+        return vary(args);
+    }
+    let graph = CorridorGraph::read(Variation::default(), args.decision.as_deref())?;
+    let plans = graph.plans(args.missions, args.common.first_seed());
     if let Some(path) = &args.record {
         return record(args, &graph, &plans, path);
     }
@@ -65,6 +68,27 @@ fn measure(
     let common = &args.common;
     common.keep("corridors", document, began, Some(lines), say)?;
     demand_none(&corridors::shortfalls(&arms, &missions))
+}
+
+/// Vigil and the ladder in every variation.
+fn vary(args: &Args) -> Result<(), Box<dyn Error>> {
+    let (mut found, began) = (Vec::new(), Instant::now());
+    for variation in Variation::read_all()? {
+        eprintln!("{}", variation.name);
+        let name = variation.name.clone();
+        let graph = CorridorGraph::read(variation, args.decision.as_deref())?;
+        let plans = graph.plans(args.missions, args.common.first_seed());
+        let arms = [CorridorArm::Vigil, CorridorArm::Ladder(graph.file.ladder)];
+        let driven = drive_all(&plans, |plan| corridors::drive(&graph, plan, &arms))?;
+        found.push(corridors::compare(&arms, &driven, &name));
+    }
+    let head = format!(
+        "{} missions, the same in each row; the variations stand in `bench/variations.toml`. \
+         Intervals: 95 %, paired.\n",
+        args.missions
+    );
+    args.common
+        .keep_comparisons("corridors-varied", &found, began, &head, "hits")
 }
 
 fn record(

@@ -8,8 +8,9 @@ use std::time::Instant;
 
 use serde_json::json;
 use vigil_bench::archive::Archive;
-use vigil_bench::missions::{self, Plan, Rule, ShippedGraph};
+use vigil_bench::missions::{self, Arm, Plan, Rule, Rules, ShippedGraph};
 use vigil_bench::tuning::tune;
+use vigil_bench::variation::Variation;
 
 use super::{MissionArgs, demand_none, drive_all};
 
@@ -31,8 +32,11 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if cfg!(debug_assertions) {
         return Err("a debug build takes hours: use scripts/bench".into());
     }
-    let shipped = ShippedGraph::read(&args.config, args.common.rate)?;
-    let plans = Plan::of_all_kinds(args.per_kind, args.common.first_seed());
+    if args.common.vary {
+        return vary(args);
+    }
+    let shipped = ShippedGraph::read(&args.config, Variation::default())?;
+    let plans = shipped.plans(args.per_kind, args.common.first_seed());
     match args.common.sweep {
         true => sweep(args, &shipped, &plans),
         false => measure(args, &shipped, &plans),
@@ -46,9 +50,38 @@ fn measure(args: &Args, shipped: &ShippedGraph, plans: &[Plan]) -> Result<(), Bo
     let mut document = missions::document(file, &arms, &driven);
     document["per_kind"] = json!(args.per_kind);
     let lines = missions::lines(&arms, &driven);
-    let say = |archive: &mut _| missions::say(archive, file, &arms, &driven, common.rate);
+    let rate_hz = shipped.setup.file.graph.rate_hz;
+    let say = |archive: &mut _| missions::say(archive, file, &arms, &driven, rate_hz);
     common.keep("missions", document, began, Some(lines), say)?;
     demand_none(&missions::shortfalls(file, &arms, &driven))
+}
+
+/// Vigil and the rules that are best at something, in every variation.
+fn vary(args: &Args) -> Result<(), Box<dyn Error>> {
+    let (mut found, began) = (Vec::new(), Instant::now());
+    let variations = Variation::read_all()?.into_iter();
+    for variation in variations.filter(|it| !it.is_of_corridors()) {
+        eprintln!("{}", variation.name);
+        let shipped = ShippedGraph::read(&args.config, variation)?;
+        let plans = shipped.plans(args.per_kind, args.common.first_seed());
+        let Rules {
+            careful,
+            stop_and_call,
+            ..
+        } = shipped.missions.rules;
+        let rules = [Rule::Careful(careful), Rule::StopAndCall(stop_and_call)];
+        let arms = [Arm::Vigil, Arm::Rule(rules[0]), Arm::Rule(rules[1])];
+        let driven = drive_all(&plans, |plan| missions::drive(&shipped, plan, &arms))?;
+        let (file, name) = (&shipped.missions, &shipped.variation.name);
+        found.push(missions::compare(file, &arms, &driven, name));
+    }
+    let head = format!(
+        "{} missions of each kind, the same in each row, weighed by `bench/missions.toml`; the \
+         variations stand in `bench/variations.toml`. Intervals: 95 %, paired.\n",
+        args.per_kind
+    );
+    args.common
+        .keep_comparisons("missions-varied", &found, began, &head, "ended unsafely")
 }
 
 fn sweep(args: &Args, shipped: &ShippedGraph, plans: &[Plan]) -> Result<(), Box<dyn Error>> {
