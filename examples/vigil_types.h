@@ -45,6 +45,7 @@
 #define VIGIL_RECOVERY_MOVE_AWAY 10u
 #define VIGIL_RECOVERY_GIVE_UP 11u
 #define VIGIL_RECOVERY_OWN 12u
+#define VIGIL_RECOVERY_LIMP_HOME 13u
 #define VIGIL_CONTROL_POLICY 1u
 #define VIGIL_CONTROL_DUAL 2u
 #define VIGIL_CONTROL_FALLBACK 3u
@@ -444,8 +445,8 @@ VIGIL_ASSERT(offsetof(vigil_fault_belief, identifying) == 2744);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, degenerate_count) == 2748);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, size_kind) == 2752);
 
-#define VIGIL_ACTION_SCHEMA 0xb468250c1c1ff74dull
-#define VIGIL_ACTION_TYPE_NAME "vigil.Action.v1.b468250c1c1ff74d"
+#define VIGIL_ACTION_SCHEMA 0x07b60509a93bc403ull
+#define VIGIL_ACTION_TYPE_NAME "vigil.Action.v1.07b60509a93bc403"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -481,8 +482,10 @@ typedef struct {
   uint32_t action;
   /* What the robot is to do: a RecoveryKind. */
   uint32_t kind;
-  /* Wheel that the action is about; u32::MAX for none. */
-  uint32_t wheel;
+  /* Stuck wheels that the action is about, as bits in the order of the robot's wheels. */
+  uint16_t stuck_wheels;
+  /* Wheels whose encoders are not to be trusted, as bits. */
+  uint16_t broken_encoders;
   /* How the action was chosen: a ControlMode. */
   uint32_t control_mode;
   /* States in use. */
@@ -530,7 +533,8 @@ VIGIL_ASSERT(offsetof(vigil_action, curvature_gain) == 912);
 VIGIL_ASSERT(offsetof(vigil_action, curvature_offset) == 920);
 VIGIL_ASSERT(offsetof(vigil_action, action) == 928);
 VIGIL_ASSERT(offsetof(vigil_action, kind) == 932);
-VIGIL_ASSERT(offsetof(vigil_action, wheel) == 936);
+VIGIL_ASSERT(offsetof(vigil_action, stuck_wheels) == 936);
+VIGIL_ASSERT(offsetof(vigil_action, broken_encoders) == 938);
 VIGIL_ASSERT(offsetof(vigil_action, control_mode) == 940);
 VIGIL_ASSERT(offsetof(vigil_action, state_count) == 944);
 VIGIL_ASSERT(offsetof(vigil_action, action_count) == 948);
@@ -657,8 +661,8 @@ VIGIL_ASSERT(offsetof(vigil_health, particles_configured) == 380);
 VIGIL_ASSERT(offsetof(vigil_health, event_count) == 384);
 VIGIL_ASSERT(offsetof(vigil_health, events) == 392);
 
-#define VIGIL_VERDICT_SCHEMA 0x643a44b44715b3d4ull
-#define VIGIL_VERDICT_TYPE_NAME "vigil.Verdict.v1.643a44b44715b3d4"
+#define VIGIL_VERDICT_SCHEMA 0x91d25a43a6ac796dull
+#define VIGIL_VERDICT_TYPE_NAME "vigil.Verdict.v1.91d25a43a6ac796d"
 typedef struct {
   /* Common header. t_capture_ns is that of the frame behind this verdict, by the publisher's own clock. */
   vigil_header header;
@@ -684,8 +688,10 @@ typedef struct {
   double curvature_offset;
   /* What the robot is to do: a RecoveryKind. */
   uint32_t kind;
-  /* Wheel that the action is about; u32::MAX for none. */
-  uint32_t wheel;
+  /* Stuck wheels that the action is about, as bits in the order of the robot's wheels. */
+  uint16_t stuck_wheels;
+  /* Wheels whose encoders are not to be trusted, as bits. */
+  uint16_t broken_encoders;
   /* 1 while the alarm stands. */
   uint32_t alarm;
   /* Alarms raised so far. */
@@ -720,7 +726,8 @@ VIGIL_ASSERT(offsetof(vigil_verdict, speed_scale) == 104);
 VIGIL_ASSERT(offsetof(vigil_verdict, curvature_gain) == 112);
 VIGIL_ASSERT(offsetof(vigil_verdict, curvature_offset) == 120);
 VIGIL_ASSERT(offsetof(vigil_verdict, kind) == 128);
-VIGIL_ASSERT(offsetof(vigil_verdict, wheel) == 132);
+VIGIL_ASSERT(offsetof(vigil_verdict, stuck_wheels) == 132);
+VIGIL_ASSERT(offsetof(vigil_verdict, broken_encoders) == 134);
 VIGIL_ASSERT(offsetof(vigil_verdict, alarm) == 136);
 VIGIL_ASSERT(offsetof(vigil_verdict, alarm_count) == 140);
 VIGIL_ASSERT(offsetof(vigil_verdict, blind) == 144);

@@ -35,6 +35,7 @@ RECOVERY_GO_THROUGH = 9
 RECOVERY_MOVE_AWAY = 10
 RECOVERY_GIVE_UP = 11
 RECOVERY_OWN = 12
+RECOVERY_LIMP_HOME = 13
 CONTROL_POLICY = 1
 CONTROL_DUAL = 2
 CONTROL_FALLBACK = 3
@@ -494,8 +495,8 @@ assert FaultBelief.size_kind.offset == 2752
 
 
 class Action(ctypes.LittleEndianStructure):
-    SCHEMA = 0xB468250C1C1FF74D
-    TYPE_NAME = "vigil.Action.v1.b468250c1c1ff74d"
+    SCHEMA = 0x07B60509A93BC403
+    TYPE_NAME = "vigil.Action.v1.07b60509a93bc403"
 
     @staticmethod
     def type_name():
@@ -536,8 +537,10 @@ class Action(ctypes.LittleEndianStructure):
         ("action", ctypes.c_uint32),
         # What the robot is to do: a RecoveryKind.
         ("kind", ctypes.c_uint32),
-        # Wheel that the action is about; u32::MAX for none.
-        ("wheel", ctypes.c_uint32),
+        # Stuck wheels that the action is about, as bits in the order of the robot's wheels.
+        ("stuck_wheels", ctypes.c_uint16),
+        # Wheels whose encoders are not to be trusted, as bits.
+        ("broken_encoders", ctypes.c_uint16),
         # How the action was chosen: a ControlMode.
         ("control_mode", ctypes.c_uint32),
         # States in use.
@@ -587,7 +590,8 @@ assert Action.curvature_gain.offset == 912
 assert Action.curvature_offset.offset == 920
 assert Action.action.offset == 928
 assert Action.kind.offset == 932
-assert Action.wheel.offset == 936
+assert Action.stuck_wheels.offset == 936
+assert Action.broken_encoders.offset == 938
 assert Action.control_mode.offset == 940
 assert Action.state_count.offset == 944
 assert Action.action_count.offset == 948
@@ -725,8 +729,8 @@ assert Health.events.offset == 392
 
 
 class Verdict(ctypes.LittleEndianStructure):
-    SCHEMA = 0x643A44B44715B3D4
-    TYPE_NAME = "vigil.Verdict.v1.643a44b44715b3d4"
+    SCHEMA = 0x91D25A43A6AC796D
+    TYPE_NAME = "vigil.Verdict.v1.91d25a43a6ac796d"
 
     @staticmethod
     def type_name():
@@ -757,8 +761,10 @@ class Verdict(ctypes.LittleEndianStructure):
         ("curvature_offset", ctypes.c_double),
         # What the robot is to do: a RecoveryKind.
         ("kind", ctypes.c_uint32),
-        # Wheel that the action is about; u32::MAX for none.
-        ("wheel", ctypes.c_uint32),
+        # Stuck wheels that the action is about, as bits in the order of the robot's wheels.
+        ("stuck_wheels", ctypes.c_uint16),
+        # Wheels whose encoders are not to be trusted, as bits.
+        ("broken_encoders", ctypes.c_uint16),
         # 1 while the alarm stands.
         ("alarm", ctypes.c_uint32),
         # Alarms raised so far.
@@ -795,7 +801,8 @@ assert Verdict.speed_scale.offset == 104
 assert Verdict.curvature_gain.offset == 112
 assert Verdict.curvature_offset.offset == 120
 assert Verdict.kind.offset == 128
-assert Verdict.wheel.offset == 132
+assert Verdict.stuck_wheels.offset == 132
+assert Verdict.broken_encoders.offset == 134
 assert Verdict.alarm.offset == 136
 assert Verdict.alarm_count.offset == 140
 assert Verdict.blind.offset == 144

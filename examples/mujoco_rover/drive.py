@@ -30,7 +30,7 @@ except ModuleNotFoundError as error:
 SENSED = ["x", "y", "yaw", *(f"enc_{w}" for w in WHEELS)]
 SENSED += [f"steer_{w}" if i in STEERED else None for i, w in enumerate(WHEELS)]
 KINDS = {value: name[9:].lower() for name, value in vars(vigil).items() if name.startswith("RECOVERY_")}
-DRIVING = ("go_on", "slow_down", "compensate", "ignore_encoder", "go_through", "move_away")
+DRIVING = ("go_on", "slow_down", "compensate", "ignore_encoder", "limp_home", "go_through", "move_away")
 
 
 def ports(topic):
@@ -57,7 +57,9 @@ class Obedience:
         self.is_valid = kind != "none" and time.monotonic_ns() <= action.valid_until_ns
         scale = action.speed_scale if self.is_valid and kind in DRIVING else 0.0
         bent = action.curvature_gain * curvature + action.curvature_offset if scale else curvature
-        shown = f"{kind} {(*WHEELS, '')[min(action.wheel, 6)]}".strip() if self.is_valid else "nothing"
+        about = action.stuck_wheels | action.broken_encoders
+        wheels = "+".join(wheel for i, wheel in enumerate(WHEELS) if about >> i & 1)
+        shown = f"{kind} {wheels}".strip() if self.is_valid else "nothing"
         if shown != self.shown:
             values = f"curvature {curvature:+.2f} -> {bent:+.2f} 1/m, speed {speed:.2f} -> {scale * speed:.2f} m/s"
             print(f"obeys {shown}: {values}", flush=True)

@@ -165,11 +165,12 @@ class Diagnostics(unittest.TestCase):
 
     def test_values(self):
         size = dict(size=0.62, size_sd=0.03, size_kind=vigil.SIZE_GAIN)
-        one = verdict(alarm=1, mode=4, mode_name=b"LF_GAIN", p_mode=0.9, p_fault=0.99, alarm_count=2, wheel=3, **size)
+        one = verdict(alarm=1, mode=4, mode_name=b"LF_GAIN", p_mode=0.9, p_fault=0.99, alarm_count=2, stuck_wheels=8, **size)
         values = dict(self.status(one)[2])
         wanted = {"graph": "left", "not measured": "enc_LF", "mode": "LF_GAIN", "probability": "0.900"}
         wanted |= {"runner-up": "LF_STUCK", "size": "gain 0.62 sd 0.03", "action": "go_on", "kind of action": "go_on"}
-        wanted |= {"p_fault": "0.990", "alarm": "yes", "alarms": "2", "blind": "no", "wheel": "3", "decision": "7"}
+        wanted |= {"p_fault": "0.990", "alarm": "yes", "alarms": "2", "blind": "no", "decision": "7"}
+        wanted |= {"stuck wheels": "3", "broken encoders": "none"}
         self.assertEqual({key: values[key] for key in wanted}, wanted)
         self.assertEqual(dict(self.status(verdict(size_kind=vigil.SIZE_STUCK))[2])["size"], "stuck")
         self.assertTrue(all(isinstance(value, str) for value in values.values()))

@@ -13,7 +13,7 @@
 //! ignore the encoder, on every rung. What it cannot name for a while is a call for help.
 
 use serde::{Deserialize, Serialize};
-use vigil_blocks::{ActionOutcome, RecoveryKind, Symptoms};
+use vigil_blocks::{ActionOutcome, AnsweredWheels, RecoveryKind, Symptoms};
 
 use crate::missions::{Cause, RuleInput, RuleOutput};
 
@@ -301,7 +301,7 @@ impl Escalation {
                 let steers = remedy.filter(|it| it.kind == RecoveryKind::Compensate);
                 RuleOutput {
                     kind,
-                    wheel: steers.and_then(|it| it.wheel),
+                    wheels: steers.map_or(AnsweredWheels::default(), |it| it.wheels),
                 }
             }
         }
@@ -340,6 +340,7 @@ mod tests {
                 explanation: None,
                 p: 1.0,
                 several: false,
+                limp_home: None,
             },
         }
     }
@@ -412,6 +413,7 @@ mod tests {
                 explanation: Some(explanation),
                 p,
                 several: false,
+                limp_home: None,
             },
             ..seen(0, Running)
         };

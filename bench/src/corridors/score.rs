@@ -3,7 +3,7 @@
 use vigil_blocks::RecoveryKind;
 
 use super::prices::CorridorPrices;
-use crate::missions::{Cause, Measure, PresentFault, Prices, RuleOutput, measure, price_1_m};
+use crate::missions::{Measure, PresentFault, Prices, RuleOutput, measure, price_1_m};
 
 /// A pose is wrong if it is off by so much, m and rad.
 const WRONG_M: f64 = 0.25;
@@ -28,10 +28,11 @@ pub(super) struct Step<'a> {
 
 /// What an order does about a fault: a manoeuvre about a wheel is driven with counter-steering.
 const fn answer(order: RuleOutput) -> RuleOutput {
-    match (order.kind, order.wheel) {
-        (RecoveryKind::GoThrough | RecoveryKind::MoveAway, Some(wheel)) => {
-            RuleOutput::remedy(Cause::Stuck(wheel))
-        }
+    match order.kind {
+        RecoveryKind::GoThrough | RecoveryKind::MoveAway if order.wheels.stuck != 0 => RuleOutput {
+            kind: RecoveryKind::Compensate,
+            ..order
+        },
         _ => order,
     }
 }
@@ -117,6 +118,7 @@ pub(super) const MEASURES: [Measure<CorridorScore>; 6] = [
 mod tests {
     use super::*;
     use crate::corridors::CorridorFile;
+    use crate::missions::Cause;
     use crate::missions::MissionFile;
 
     #[test]

@@ -2,6 +2,7 @@
 
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
+use vigil_blocks::AnsweredWheels;
 
 use super::kind::Kind;
 
@@ -54,6 +55,18 @@ pub enum Cause {
     Encoder(usize),
     /// Something that no model contains.
     Unmodelled,
+}
+
+impl Cause {
+    /// The wheel that it is about, as an action answers it.
+    #[must_use]
+    pub fn wheels(self) -> AnsweredWheels {
+        match self {
+            Self::Stuck(wheel) => AnsweredWheels::one_stuck(wheel),
+            Self::Encoder(wheel) => AnsweredWheels::one_encoder(wheel),
+            Self::Unmodelled => AnsweredWheels::default(),
+        }
+    }
 }
 
 /// A fault that is there.

@@ -4,7 +4,7 @@ use vigil_blocks::{DetectionBelief, FaultBelief, MODE_MULTIPLE};
 use vigil_setup::Setup;
 
 use super::breakdown::Cause;
-use super::rules::RuleInput;
+use super::rules::{RuleInput, RuleOutput};
 
 /// Leaves of the tree with what they mean.
 #[derive(Debug, Clone)]
@@ -41,7 +41,21 @@ impl Explanations {
             explanation,
             p,
             several: diagnosis.mode == MODE_MULTIPLE,
+            limp_home: self.limp_home(diagnosis),
         }
+    }
+
+    /// What answers all faults of the most probable set, if they are several.
+    fn limp_home(&self, diagnosis: &FaultBelief) -> Option<RuleOutput> {
+        let sets = diagnosis.sets.iter().take(diagnosis.set_count as usize);
+        let set = sets.max_by(|a, b| a.p.total_cmp(&b.p))?;
+        let held = self
+            .leaves
+            .iter()
+            .filter(|(node, _)| set.leaves >> node & 1 == 1);
+        let several = set.leaves.count_ones() > 1;
+        let order = RuleOutput::limp_home(held.map(|(_, cause)| *cause));
+        order.filter(|_| several)
     }
 
     /// The most probable explanation, `None` for none, and its probability. Ties go to none, then

@@ -1,6 +1,6 @@
 //! Orders of rules as action blocks, and back.
 
-use vigil_blocks::{Action, RecoveryKind};
+use vigil_blocks::{Action, RecoveryKind, WHEELS};
 use vigil_setup::Setup;
 
 use super::rules::RuleOutput;
@@ -10,25 +10,38 @@ use super::rules::RuleOutput;
 pub fn order(action: &Action) -> RuleOutput {
     RuleOutput {
         kind: RecoveryKind::from_repr(action.kind).unwrap_or(RecoveryKind::None),
-        wheel: (action.wheel != u32::MAX).then_some(action.wheel as usize),
+        wheels: action.answered(),
     }
 }
 
 /// The action block of an order, as the supervisor would write it. A rover that moves and whose
-/// order is about a stuck wheel steers against it.
+/// order is about stuck wheels steers against them.
 #[must_use]
 pub fn action_block(setup: &Setup, order: RuleOutput) -> Action {
-    let RuleOutput { kind, wheel } = order;
+    let RuleOutput { kind, wheels } = order;
     let steers = matches!(
         kind,
-        RecoveryKind::Compensate | RecoveryKind::GoThrough | RecoveryKind::MoveAway
+        RecoveryKind::Compensate
+            | RecoveryKind::LimpHome
+            | RecoveryKind::GoThrough
+            | RecoveryKind::MoveAway
     );
-    let steered = wheel.filter(|_| steers);
-    let (gain, offset) = steered.map_or((1.0, 0.0), |w| setup.model.compensation(w));
+    let (mut gain, mut offset) = (1.0, 0.0);
+    let steered = (0..WHEELS).filter(|wheel| steers && wheels.has_stuck(*wheel));
+    for (at, wheel) in steered.enumerate() {
+        let of_wheel = setup.model.compensation(wheel);
+        gain = if at == 0 {
+            of_wheel.0
+        } else {
+            gain + of_wheel.0 - 1.0
+        };
+        offset += of_wheel.1;
+    }
     Action {
         decision_seq: 1,
         kind: kind as u32,
-        wheel: wheel.map_or(u32::MAX, |wheel| wheel as u32),
+        stuck_wheels: wheels.stuck,
+        broken_encoders: wheels.encoders,
         speed_scale: order.speed_scale(),
         curvature_gain: gain,
         curvature_offset: offset,

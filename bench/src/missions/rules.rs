@@ -12,7 +12,7 @@ pub use ladder::{Ladder, LadderSettings};
 pub use stop_and_call::{StopAndCall, StopAndCallSettings};
 
 use serde::{Deserialize, Serialize};
-use vigil_blocks::RecoveryKind;
+use vigil_blocks::{AnsweredWheels, RecoveryKind};
 
 use super::breakdown::Cause;
 
@@ -27,6 +27,8 @@ pub struct RuleInput {
     pub p: f64,
     /// True if the identifier holds two faults or more for more probable than not.
     pub several: bool,
+    /// What answers the most probable set of several faults, if anything does.
+    pub limp_home: Option<RuleOutput>,
 }
 
 #[cfg(test)]
@@ -38,6 +40,7 @@ impl RuleInput {
             explanation: None,
             p: 1.0,
             several: false,
+            limp_home: None,
         }
     }
 }
@@ -47,26 +50,55 @@ impl RuleInput {
 pub struct RuleOutput {
     /// Kind of action.
     pub kind: RecoveryKind,
-    /// The wheel it is about.
-    pub wheel: Option<usize>,
+    /// The wheels it is about.
+    pub wheels: AnsweredWheels,
 }
 
 impl RuleOutput {
     /// An action that is about no wheel.
     #[must_use]
-    pub const fn plain(kind: RecoveryKind) -> Self {
-        Self { kind, wheel: None }
+    pub fn plain(kind: RecoveryKind) -> Self {
+        Self {
+            kind,
+            wheels: AnsweredWheels::default(),
+        }
     }
 
     /// What a cause asks for: counter-steer, ignore the encoder, go slowly.
     #[must_use]
-    pub const fn remedy(cause: Cause) -> Self {
-        let (kind, wheel) = match cause {
-            Cause::Stuck(wheel) => (RecoveryKind::Compensate, Some(wheel)),
-            Cause::Encoder(wheel) => (RecoveryKind::IgnoreEncoder, Some(wheel)),
-            Cause::Unmodelled => (RecoveryKind::SlowDown, None),
+    pub fn remedy(cause: Cause) -> Self {
+        let kind = match cause {
+            Cause::Stuck(_) => RecoveryKind::Compensate,
+            Cause::Encoder(_) => RecoveryKind::IgnoreEncoder,
+            Cause::Unmodelled => RecoveryKind::SlowDown,
         };
-        Self { kind, wheel }
+        Self {
+            kind,
+            wheels: cause.wheels(),
+        }
+    }
+
+    /// What several causes ask for, if a rover with these can be driven: two stuck wheels on one
+    /// side cannot be steered against.
+    #[must_use]
+    pub fn limp_home(causes: impl IntoIterator<Item = Cause>) -> Option<Self> {
+        let mut wheels = AnsweredWheels::default();
+        for cause in causes {
+            if cause == Cause::Unmodelled {
+                return None;
+            }
+            wheels = wheels.with(cause.wheels());
+        }
+        let on_a_side = |side: std::ops::Range<usize>| {
+            let stuck = side.filter(|wheel| wheels.has_stuck(*wheel));
+            stuck.count()
+        };
+        let is_drivable = on_a_side(0..3) <= 1 && on_a_side(3..6) <= 1;
+        let order = Self {
+            kind: RecoveryKind::LimpHome,
+            wheels,
+        };
+        is_drivable.then_some(order)
     }
 
     /// Share of the planned speed, as Vigil's actions have it by default.
@@ -77,7 +109,7 @@ impl RuleOutput {
             | RecoveryKind::IgnoreEncoder
             | RecoveryKind::GoThrough
             | RecoveryKind::MoveAway => 1.0,
-            RecoveryKind::Compensate => 0.7,
+            RecoveryKind::Compensate | RecoveryKind::LimpHome => 0.7,
             RecoveryKind::SlowDown => 0.5,
             _ => 0.0,
         }

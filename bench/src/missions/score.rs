@@ -1,6 +1,6 @@
 //! What a mission brought.
 
-use vigil_blocks::RecoveryKind;
+use vigil_blocks::{AnsweredWheels, RecoveryKind};
 
 use super::breakdown::{Cause, PresentFault};
 use super::prices::Prices;
@@ -23,7 +23,16 @@ const fn stands(order: RuleOutput) -> bool {
 
 /// True if an order is the remedy for a cause.
 fn remedies(order: RuleOutput, cause: Cause) -> bool {
-    cause != Cause::Unmodelled && order == RuleOutput::remedy(cause)
+    use RecoveryKind::{Compensate, IgnoreEncoder, LimpHome};
+    match cause {
+        Cause::Stuck(wheel) => {
+            matches!(order.kind, Compensate | LimpHome) && order.wheels.has_stuck(wheel)
+        }
+        Cause::Encoder(wheel) => {
+            matches!(order.kind, IgnoreEncoder | LimpHome) && order.wheels.has_encoder(wheel)
+        }
+        Cause::Unmodelled => false,
+    }
 }
 
 /// Price of a metre with these faults under an order, at a share of the planned speed. The price of
@@ -41,13 +50,26 @@ pub fn price_1_m(prices: &Prices, faults: &[PresentFault], order: RuleOutput, sp
         };
         price * fault.severity
     });
-    let is_needed = faults.iter().any(|fault| remedies(order, fault.cause));
-    let needless = match order.kind {
-        RecoveryKind::Compensate if !is_needed => prices.needless_1_m.compensation,
-        RecoveryKind::IgnoreEncoder if !is_needed => prices.needless_1_m.ignoring,
+    priced.sum::<f64>() + needless_1_m(prices, faults, order)
+}
+
+/// Price of a metre with remedies for what is not there.
+fn needless_1_m(prices: &Prices, faults: &[PresentFault], order: RuleOutput) -> f64 {
+    let of = &prices.needless_1_m;
+    let (stuck, encoders) = (order.wheels.stuck, order.wheels.encoders);
+    let there = faults.iter().map(|fault| fault.cause.wheels());
+    let there = there.fold(AnsweredWheels::default(), AnsweredWheels::with);
+    let steers_needlessly = stuck & !there.stuck != 0;
+    let ignores_needlessly = encoders & !there.encoders != 0;
+    let price = |is: bool, price: f64| if is { price } else { 0.0 };
+    match order.kind {
+        RecoveryKind::Compensate => price(steers_needlessly || stuck == 0, of.compensation),
+        RecoveryKind::IgnoreEncoder => price(ignores_needlessly || encoders == 0, of.ignoring),
+        RecoveryKind::LimpHome => {
+            price(steers_needlessly, of.compensation) + price(ignores_needlessly, of.ignoring)
+        }
         _ => 0.0,
-    };
-    priced.sum::<f64>() + needless
+    }
 }
 
 /// What adds up while a mission is driven.
@@ -219,14 +241,32 @@ mod tests {
 
     #[test]
     fn a_metre_costs_what_each_fault_does_under_the_order() {
-        use RecoveryKind::{Compensate, GoOn, IgnoreEncoder, SlowDown};
+        use RecoveryKind::{Compensate, GoOn, IgnoreEncoder, LimpHome, SlowDown};
         let prices = MissionFile::read().unwrap().prices;
-        let order = |kind, wheel| RuleOutput { kind, wheel };
+        let about = |kind, causes: &[Cause]| RuleOutput {
+            kind,
+            wheels: causes
+                .iter()
+                .map(|cause| cause.wheels())
+                .fold(AnsweredWheels::default(), AnsweredWheels::with),
+        };
+        let order = |kind, wheel: Option<usize>| match (kind, wheel) {
+            (_, None) => about(kind, &[]),
+            (IgnoreEncoder, Some(wheel)) => about(kind, &[Cause::Encoder(wheel)]),
+            (_, Some(wheel)) => about(kind, &[Cause::Stuck(wheel)]),
+        };
+        let limp = |causes: &[Cause]| about(LimpHome, causes);
         let stuck = [fault(Cause::Stuck(4), 1.0)];
         let encoder = [fault(Cause::Encoder(0), 1.0)];
         let both = [stuck[0], encoder[0]];
         let half = [fault(Cause::Unmodelled, 0.5)];
-        let cases: [(&[PresentFault], RuleOutput, f64, f64); 10] = [
+        let (jam, lie) = (Cause::Stuck(4), Cause::Encoder(0));
+        let cases: [(&[PresentFault], RuleOutput, f64, f64); 15] = [
+            (&both, limp(&[jam, lie]), 0.7, 12.5),
+            (&stuck, limp(&[jam, lie]), 0.7, 15.0),
+            (&encoder, limp(&[jam, lie]), 0.7, 102.5),
+            (&encoder, limp(&[lie, Cause::Encoder(2)]), 0.7, 7.5),
+            (&both, limp(&[jam]), 0.7, 10.0 + 52.5),
             (&[], order(GoOn, None), 1.0, 0.0),
             (&[], order(Compensate, Some(1)), 0.7, 100.0),
             (&stuck, order(GoOn, None), 1.0, 200.0),
@@ -252,14 +292,13 @@ mod tests {
         let prices = MissionFile::read().unwrap().prices;
         let mut tally = Tally::default();
         let stuck = [fault(Cause::Stuck(1), 1.0)];
-        let obeyed = |kind, wheel| RuleOutput { kind, wheel };
-        use RecoveryKind::{CallForHelp, Compensate, GoOn};
+        use RecoveryKind::{CallForHelp, GoOn};
         // Two seconds each: healthy, unanswered, answered, and a call.
         let script = [
-            (&[][..], obeyed(GoOn, None), 0.4),
-            (&stuck, obeyed(GoOn, None), 0.4),
-            (&stuck, obeyed(Compensate, Some(1)), 0.2),
-            (&stuck, obeyed(CallForHelp, None), 0.0),
+            (&[][..], RuleOutput::plain(GoOn), 0.4),
+            (&stuck, RuleOutput::plain(GoOn), 0.4),
+            (&stuck, RuleOutput::remedy(Cause::Stuck(1)), 0.2),
+            (&stuck, RuleOutput::plain(CallForHelp), 0.0),
         ];
         for (faults, obeyed, way_m) in script {
             for _ in 0..100 {

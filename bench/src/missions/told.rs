@@ -43,7 +43,9 @@ fn cheapest(prices: &Prices, faults: &[PresentFault], rest_m: f64) -> (RuleOutpu
     let has_remedy = |fault: &&PresentFault| fault.cause != Cause::Unmodelled;
     let remedies = faults.iter().filter(has_remedy);
     let remedies = remedies.map(|fault| RuleOutput::remedy(fault.cause));
-    let priced = plain.into_iter().chain(remedies).map(|output| {
+    let all = RuleOutput::limp_home(faults.iter().map(|fault| fault.cause));
+    let all = all.filter(|_| faults.len() > 1);
+    let priced = plain.into_iter().chain(remedies).chain(all).map(|output| {
         let speed = output.speed_scale();
         let waits_s = rest_m / SPEED_M_S * (1.0 / speed - 1.0);
         let price = price_1_m(prices, faults, output, speed) * rest_m + prices.time_1_s * waits_s;
@@ -83,10 +85,20 @@ mod tests {
         let unmodelled = [fault(Cause::Unmodelled, 1.0)];
         assert_eq!(order(&unmodelled, 3.0).kind, CallForHelp);
         assert_eq!(order(&unmodelled, 1.0).kind, SlowDown);
-        // A stuck wheel and another's encoder: 10 + 75 * 0.7 a metre.
+        // A stuck wheel and another's encoder: 10 + 2.5 a metre, with both remedies.
         let both = [stuck[0], encoder[0]];
-        assert_eq!(order(&both, 8.0).kind, CallForHelp);
-        assert_eq!(order(&both, 3.0), RuleOutput::remedy(Cause::Stuck(4)));
+        let limping = RuleOutput::limp_home([Cause::Stuck(4), Cause::Encoder(1)]).unwrap();
+        assert_eq!(limping.kind, RecoveryKind::LimpHome);
+        assert_eq!(order(&both, 18.0), limping);
+        // Two wheels of one side cannot be steered against.
+        let one_side = [stuck[0], fault(Cause::Stuck(3), 1.0)];
+        assert_eq!(
+            RuleOutput::limp_home([Cause::Stuck(4), Cause::Stuck(3)]),
+            None
+        );
+        assert_eq!(order(&one_side, 8.0).kind, CallForHelp);
+        let two_sides = [stuck[0], fault(Cause::Stuck(0), 1.0)];
+        assert_eq!(order(&two_sides, 8.0).kind, RecoveryKind::LimpHome);
     }
 
     #[test]

@@ -140,7 +140,8 @@ fn hash_action(hash: u64, action: &Action) -> u64 {
         &action.curvature_offset,
     ];
     let hash = hash_values(hash, values.chain(parameters));
-    let words = [action.action, action.kind, action.wheel];
+    let wheels = action.answered().to_event() as u32;
+    let words = [action.action, action.kind, wheels];
     hash_words(
         hash,
         words

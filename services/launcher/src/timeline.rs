@@ -5,8 +5,8 @@ use std::fmt;
 
 use serde::Serialize;
 use vigil_blocks::{
-    ActionRejection, Blindness, Event, EventKind, Evidence, MODE_MULTIPLE, Rejection, SizeKind,
-    Weighing, mode_word,
+    ActionRejection, AnsweredWheels, Blindness, Event, EventKind, Evidence, MODE_MULTIPLE,
+    Rejection, SizeKind, Weighing, mode_word,
 };
 use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
@@ -402,11 +402,9 @@ impl Namer {
             }
             EventKind::Action | EventKind::Obeys => {
                 let action = self.actions.get(event.what as usize);
-                let wheel = usize::try_from(event.value)
-                    .ok()
-                    .and_then(|i| self.robot.wheels.get(i));
                 let action = action.map_or("?", String::as_str);
-                wheel.map_or_else(|| action.to_owned(), |w| format!("{action}:{}", w.name))
+                let wheels = AnsweredWheels::from_event(event.value);
+                self.robot.action_text(action, wheels)
             }
             EventKind::Injected | EventKind::Restored => {
                 let wire = WireChange::from_event(kind == EventKind::Injected, event);

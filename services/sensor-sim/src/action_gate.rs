@@ -150,7 +150,8 @@ fn admit(
         | RecoveryKind::MoveAway
         | RecoveryKind::SlowDown
         | RecoveryKind::Compensate
-        | RecoveryKind::IgnoreEncoder => {
+        | RecoveryKind::IgnoreEncoder
+        | RecoveryKind::LimpHome => {
             let target = DriveCommand {
                 curvature_1_m: gain * planned.curvature_1_m + offset,
                 speed_m_s: scale * planned.speed_m_s,
@@ -205,9 +206,12 @@ mod tests {
 
     #[test]
     fn driving_kinds_scale_the_speed_and_bend_the_curvature() {
-        use RecoveryKind::{Compensate, GoOn, GoThrough, IgnoreEncoder, MoveAway, SlowDown};
+        use RecoveryKind::{
+            Compensate, GoOn, GoThrough, IgnoreEncoder, LimpHome, MoveAway, SlowDown,
+        };
         for kind in [
             GoOn,
+            LimpHome,
             SlowDown,
             Compensate,
             IgnoreEncoder,

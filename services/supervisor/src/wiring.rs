@@ -1,7 +1,8 @@
 //! The supervisor at its ports.
 
 use vigil_blocks::{
-    Action, Cause, CauseKind, ControlMode, DetectionBelief, Entry, EventKind, FaultBelief, Weighing,
+    Action, AnsweredWheels, Cause, CauseKind, ControlMode, DetectionBelief, Entry, EventKind,
+    FaultBelief, Weighing,
 };
 use vigil_cycle::{
     Clock, Graph, HealthBoard, InputAccount, Intake, PortError, Receiver, Sender, Stage, Stamp,
@@ -53,7 +54,7 @@ struct ModelStep {
 struct LastDecision {
     seq: u64,
     action: u32,
-    wheel: u32,
+    wheels: AnsweredWheels,
     p: f64,
     weighing: Option<Weighing>,
 }
@@ -197,7 +198,7 @@ impl Stage for SupervisorStage {
         self.decided = LastDecision {
             seq: action.decision_seq,
             action: action.action,
-            wheel: action.wheel,
+            wheels: action.answered(),
             p: action.belief[..states].iter().copied().fold(0.0, f64::max),
             // Only a new decision is told; a stop by rule was weighed from nothing.
             weighing: match action.decision_seq == self.decision_reported
@@ -224,12 +225,12 @@ impl Stage for SupervisorStage {
         let LastDecision {
             seq,
             action,
-            wheel,
+            wheels,
             p,
             weighing,
         } = self.decided;
         if seq != self.decision_reported {
-            health.event(now_ns, EventKind::Action, action, p, u64::from(wheel));
+            health.event(now_ns, EventKind::Action, action, p, wheels.to_event());
             if let Some((what, p, value)) = weighing.as_ref().map(Weighing::to_event) {
                 health.event(now_ns, EventKind::Weighed, what, p, value);
             }

@@ -2,6 +2,7 @@
 
 use strum::FromRepr;
 
+use crate::answered_wheels::AnsweredWheels;
 use crate::block::block;
 use crate::header::{Cause, Header};
 
@@ -50,8 +51,10 @@ block! {
         pub action: u32,
         /// What the robot is to do: a [`RecoveryKind`].
         pub kind: u32,
-        /// Wheel that the action is about; `u32::MAX` for none.
-        pub wheel: u32,
+        /// Stuck wheels that the action is about, as bits in the order of the robot's wheels.
+        pub stuck_wheels: u16,
+        /// Wheels whose encoders are not to be trusted, as bits.
+        pub broken_encoders: u16,
         /// How the action was chosen: a [`ControlMode`].
         pub control_mode: u32,
         /// States in use.
@@ -87,6 +90,22 @@ block! {
     }
 }
 
+impl Action {
+    /// The wheels that the action is about.
+    #[must_use]
+    pub const fn answered(&self) -> AnsweredWheels {
+        AnsweredWheels {
+            stuck: self.stuck_wheels,
+            encoders: self.broken_encoders,
+        }
+    }
+
+    /// Says which wheels the action is about.
+    pub const fn answer(&mut self, wheels: AnsweredWheels) {
+        (self.stuck_wheels, self.broken_encoders) = (wheels.stuck, wheels.encoders);
+    }
+}
+
 /// What the robot is to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr)]
 #[repr(u32)]
@@ -117,6 +136,9 @@ pub enum RecoveryKind {
     GiveUp = 11,
     /// An action of the user's own: `action` says which.
     Own = 12,
+    /// Drive on with several faults: counter-steer against every stuck wheel, trust no broken
+    /// encoder.
+    LimpHome = 13,
 }
 
 /// Why a robot does not obey an action, and stops itself.

@@ -46,7 +46,8 @@ pub enum EventKind {
     /// A diagnosis. `what`: node of the fault tree, or one of the `MODE_*`; `value`: leaves of
     /// the most probable fault set as bits.
     Diagnosis = 6,
-    /// A decision. `what`: action of the decision model; `value`: the action's wheel.
+    /// A decision. `what`: action of the decision model; `value`: its wheels, as
+    /// [`crate::AnsweredWheels::to_event`] says.
     Action = 7,
     /// Deadlines missed. `value`: how many in a row.
     Miss = 8,

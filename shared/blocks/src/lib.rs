@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod action;
+mod answered_wheels;
 mod block;
 mod control;
 pub mod datagram;
@@ -21,6 +22,7 @@ pub use action::{
     Action, ActionRejection, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind,
     ValueKind,
 };
+pub use answered_wheels::AnsweredWheels;
 pub use block::{Block, fnv1a};
 #[doc(hidden)]
 pub use block::{ascii, name_with_hash};

@@ -37,8 +37,10 @@ block! {
         pub curvature_offset: f64,
         /// What the robot is to do: a [`crate::RecoveryKind`].
         pub kind: u32,
-        /// Wheel that the action is about; `u32::MAX` for none.
-        pub wheel: u32,
+        /// Stuck wheels that the action is about, as bits in the order of the robot's wheels.
+        pub stuck_wheels: u16,
+        /// Wheels whose encoders are not to be trusted, as bits.
+        pub broken_encoders: u16,
         /// 1 while the alarm stands.
         pub alarm: u32,
         /// Alarms raised so far.
@@ -92,7 +94,9 @@ impl Verdict {
         self.speed_scale = action.speed_scale;
         self.curvature_gain = action.curvature_gain;
         self.curvature_offset = action.curvature_offset;
-        (self.kind, self.wheel) = (action.kind, action.wheel);
+        self.kind = action.kind;
+        self.stuck_wheels = action.stuck_wheels;
+        self.broken_encoders = action.broken_encoders;
         (self.alarm, self.alarm_count) = (action.alarm, action.alarm_count);
         (self.blind, self.lost_stages) = (action.blind, action.lost_stages);
         self.mode = belief.reported;

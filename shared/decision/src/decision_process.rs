@@ -2,7 +2,7 @@
 //! choice, and how they are published.
 
 use vigil_blocks::{
-    Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind, ValueKind,
+    Action, AnsweredWheels, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind, ValueKind,
 };
 use vigil_pomdp::policy::Measure;
 use vigil_pomdp::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
@@ -50,7 +50,7 @@ pub(crate) trait DecisionRule {
 pub(crate) struct Instruction {
     pub action: usize,
     pub kind: RecoveryKind,
-    pub wheel: Option<usize>,
+    pub wheels: AnsweredWheels,
 }
 
 /// A step of the decision model.
@@ -154,7 +154,7 @@ impl DecisionProcess {
             .map_or(RecoveryKind::Stop, |m| m.kind)
     }
 
-    /// Takes over the policy's choice, unless another action is latched, and the wheel that it is
+    /// Takes over the policy's choice, unless another action is latched, and the wheels that it is
     /// about.
     pub(crate) fn choose(&mut self, best: Choice, latch: &mut Latch, wheels: &mut Wheels) {
         let choice = latch.choose(best, |action| self.kind(action));
@@ -171,7 +171,7 @@ impl DecisionProcess {
         Instruction {
             action,
             kind: self.kind(action),
-            wheel: wheels.about(),
+            wheels: wheels.about(),
         }
     }
 
@@ -183,7 +183,7 @@ impl DecisionProcess {
         Instruction {
             action: stop.unwrap_or(self.choice.action),
             kind: RecoveryKind::Stop,
-            wheel: None,
+            wheels: AnsweredWheels::default(),
         }
     }
 
@@ -221,7 +221,7 @@ impl DecisionProcess {
         action.speed_scale = meaning.map_or(0.0, |m| if stops { 0.0 } else { m.speed_scale });
         action.action = instruction.action as u32;
         action.kind = instruction.kind as u32;
-        action.wheel = instruction.wheel.map_or(u32::MAX, |wheel| wheel as u32);
+        action.answer(instruction.wheels);
         action.control_mode = self.published_mode() as u32;
         action.state_count = belief.len() as u32;
         action.action_count = values.len() as u32;
@@ -321,7 +321,7 @@ mod tests {
         write_changed(&process, |_| Instruction {
             action: 0,
             kind: RecoveryKind::GoOn,
-            wheel: None,
+            wheels: AnsweredWheels::default(),
         });
     }
 }

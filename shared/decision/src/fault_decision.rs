@@ -105,7 +105,8 @@ impl FaultDecision {
         let process = &mut self.process;
         let before = process.tracker.belief();
         let weights = &mut process.scratch;
-        write_weights(diagnosis, &self.states, alarm, before, weights);
+        let drivable = self.wheels.drivable();
+        write_weights(diagnosis, &self.states, drivable, alarm, before, weights);
         normalise(weights);
         if timed {
             process.log_evidence = log_score(before, weights);

@@ -5,6 +5,7 @@ use vigil_pomdp::Pomdp;
 use vigil_robot::FaultTree;
 
 use crate::alarm_fusion::Situation;
+use crate::drivable::DrivableSets;
 use crate::error::SupervisorError;
 use crate::joint_states::JointStates;
 use crate::state_belief::{self, normalise, write_fallback, write_weights};
@@ -46,7 +47,9 @@ impl HardwareBelief {
     /// Takes a sound diagnosis; `belief` is the predicted one over the model's states.
     pub(crate) fn take(&mut self, diagnosis: &FaultBelief, situation: Situation, belief: &[f64]) {
         self.take_by(situation.rests, belief, |states, predicted, p| {
-            write_weights(diagnosis, states, situation.alarm, predicted, p);
+            // A model of navigation and hardware together has no action that limps home.
+            let none = DrivableSets::none();
+            write_weights(diagnosis, states, &none, situation.alarm, predicted, p);
             normalise(p);
         });
     }

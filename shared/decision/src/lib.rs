@@ -3,6 +3,7 @@
 mod alarm_fusion;
 mod decision_process;
 mod despot_settings;
+mod drivable;
 mod epoch;
 mod error;
 mod fault_decision;

@@ -81,7 +81,7 @@ const fn usual_speed_scale(kind: RecoveryKind) -> f64 {
         | RecoveryKind::GiveUp
         | RecoveryKind::Own => 0.0,
         RecoveryKind::SlowDown => 0.5,
-        RecoveryKind::Compensate => 0.7,
+        RecoveryKind::Compensate | RecoveryKind::LimpHome => 0.7,
         RecoveryKind::GoOn
         | RecoveryKind::IgnoreEncoder
         | RecoveryKind::GoThrough
@@ -99,7 +99,13 @@ const fn usually_has_end(kind: RecoveryKind) -> bool {
         | R::CallForHelp
         | R::GiveUp
         | R::Own => true,
-        R::None | R::GoOn | R::SlowDown | R::Stop | R::Compensate | R::IgnoreEncoder => false,
+        R::None
+        | R::GoOn
+        | R::SlowDown
+        | R::Stop
+        | R::Compensate
+        | R::IgnoreEncoder
+        | R::LimpHome => false,
     }
 }
 
@@ -110,7 +116,10 @@ pub(crate) fn check_compensation(
     actions: &[ActionMeaning],
     compensation: &[Compensation],
 ) -> Result<(), SupervisorError> {
-    let compensates = |meaning: &ActionMeaning| meaning.kind == RecoveryKind::Compensate;
+    let compensates = |meaning: &ActionMeaning| {
+        let kinds = [RecoveryKind::Compensate, RecoveryKind::LimpHome];
+        kinds.contains(&meaning.kind)
+    };
     let Some(action) = actions.iter().position(compensates) else {
         return Ok(());
     };
@@ -150,7 +159,7 @@ mod tests {
                 ][..],
             ),
             (0.5, &[R::SlowDown]),
-            (0.7, &[R::Compensate]),
+            (0.7, &[R::Compensate, R::LimpHome]),
             (1.0, &[R::GoOn, R::IgnoreEncoder, R::GoThrough, R::MoveAway]),
         ] {
             for kind in kinds {

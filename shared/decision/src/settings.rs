@@ -145,13 +145,13 @@ pub enum Gate {
 pub struct RecoveryAction {
     /// Kind of the recovery.
     pub kind: Recovery,
-    /// Factor on the commanded speed. Unless given: 0.5 for `slow_down`, 0.7 for `compensate`, 0
-    /// for what is done standing (`stop`, `call_for_help`, `new_path`, `relocalise`, `give_up`,
+    /// Factor on the commanded speed. Unless given: 0.5 for `slow_down`, 0.7 for `compensate` and
+    /// `limp_home`, 0 for what is done standing (`stop`, `call_for_help`, `new_path`, `relocalise`, `give_up`,
     /// `own`), else 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub speed_scale: Option<f64>,
     /// Whether the robot reports that it is done. Unless given: not for what goes on (`go_on`,
-    /// `slow_down`, `stop`, `compensate`, `ignore_encoder`), else yes.
+    /// `slow_down`, `stop`, `compensate`, `ignore_encoder`, `limp_home`), else yes.
     pub has_end: Option<bool>,
     /// With `symptoms`: the longest epoch of this action, in place of `supervisor.epoch_ms`.
     #[schemars(range(min = 100.0, max = 60_000.0))]
@@ -172,6 +172,10 @@ pub enum Recovery {
     Compensate,
     /// Drive on without trusting one wheel's encoder.
     IgnoreEncoder,
+    /// Drive on with several faults: counter-steer against each stuck wheel, trust no broken
+    /// encoder. Of faults it answers those with which the robot can be driven: no two stuck wheels
+    /// on one side.
+    LimpHome,
     /// Stop and call for help.
     CallForHelp,
     /// Ask the planner for another path.
@@ -196,6 +200,7 @@ impl From<Recovery> for RecoveryKind {
             Recovery::Stop => Self::Stop,
             Recovery::Compensate => Self::Compensate,
             Recovery::IgnoreEncoder => Self::IgnoreEncoder,
+            Recovery::LimpHome => Self::LimpHome,
             Recovery::CallForHelp => Self::CallForHelp,
             Recovery::NewPath => Self::NewPath,
             Recovery::Relocalise => Self::Relocalise,

@@ -1,9 +1,10 @@
 //! The identifier's belief, over the decision model's states.
 //!
 //! States exclude each other, faults do not: a set of several faults counts once. It belongs to
-//! SEVERAL: an action compensates one wheel, and ignores one encoder. In a model without that state
-//! it belongs to the one that holds all of its leaves; else to UNKNOWN. What the sets that are
-//! reported leave of a leaf's probability counts for the leaf.
+//! SEVERAL_DRIVABLE if a robot can be driven home with it, and to SEVERAL if not, or if the model
+//! does not tell them apart. In a model without these states it belongs to the one that holds all of
+//! its leaves; else to UNKNOWN. What the sets that are reported leave of a leaf's probability counts
+//! for the leaf.
 //!
 //! States that stand for the same (UNKNOWN and UNKNOWN_OLD) share its probability as the predicted
 //! belief does: the identifier says nothing of a fault's age, the decision model's transitions do.
@@ -12,6 +13,7 @@
 
 use vigil_blocks::{DetectionBelief, FaultBelief, FaultSet};
 
+use crate::drivable::DrivableSets;
 use crate::states::{StateMeaning, Subject};
 
 /// A probability may exceed 1 by this much, for rounding. Chosen: far beyond what sums round to.
@@ -31,6 +33,7 @@ const P_SUM_MIN: f64 = 0.5;
 pub(crate) fn write_weights(
     diagnosis: &FaultBelief,
     states: &[StateMeaning],
+    drivable: &DrivableSets,
     alarm: bool,
     predicted: &[f64],
     weights: &mut [f64],
@@ -39,8 +42,10 @@ pub(crate) fn write_weights(
         *weight = probability(diagnosis, *meaning, alarm);
     }
     let several = position(states, Subject::Several);
+    let driven = position(states, Subject::Drivable);
     for set in sets_of_several(diagnosis) {
-        divide(set, states, several, weights);
+        let driven = driven.filter(|_| drivable.holds(set.leaves));
+        divide(set, states, driven.or(several), weights);
     }
     share_unknown(states, predicted, weights);
 }
@@ -100,7 +105,7 @@ fn probability(diagnosis: &FaultBelief, meaning: StateMeaning, alarm: bool) -> f
         Subject::Nominal if !alarm => (diagnosis.p[0] + diagnosis.p_unknown).min(1.0),
         Subject::Nominal => diagnosis.p[0],
         Subject::Fault => leaves(diagnosis, meaning).sum(),
-        Subject::Unknown | Subject::Several | Subject::Done => 0.0,
+        Subject::Unknown | Subject::Several | Subject::Drivable | Subject::Done => 0.0,
     }
 }
 

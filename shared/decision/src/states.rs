@@ -14,6 +14,8 @@ const UNKNOWN_OLD: &str = "UNKNOWN_OLD";
 const FAULT: &str = "FAULT";
 /// Name of the state of two faults or more.
 const SEVERAL: &str = "SEVERAL";
+/// Name of the state of those of them with which a robot can be driven home.
+const DRIVABLE: &str = "SEVERAL_DRIVABLE";
 /// Name of the state after the end of the task. It is never believed: what goes on has not ended.
 const DONE: &str = "DONE";
 
@@ -26,6 +28,8 @@ pub(crate) enum Subject {
     Fault,
     /// Two leaves or more.
     Several,
+    /// Two leaves or more, with which a robot can be driven home.
+    Drivable,
     /// What no modelled fault explains.
     Unknown,
     /// The task is done.
@@ -105,6 +109,7 @@ pub(crate) fn states(
         subject: match name.as_str() {
             UNKNOWN | UNKNOWN_OLD => Subject::Unknown,
             SEVERAL => Subject::Several,
+            DRIVABLE => Subject::Drivable,
             DONE => Subject::Done,
             name if name == nominal => Subject::Nominal,
             _ => Subject::Fault,
@@ -174,7 +179,10 @@ mod tests {
             ("ND UNKNOWN LEFT R1 GYRO", &[0, 0, 12, 16, 32]),
             ("ND UNKNOWN LEFT STUCK GYRO", &[0, 0, 12, 16, 32]),
             ("STUCK UNKNOWN ND L2 FAULT", &[20, 0, 0, 8, 32]),
-            ("ND UNKNOWN FAULT SEVERAL DONE", &[0, 0, 60, 0, 0]),
+            (
+                "ND UNKNOWN FAULT SEVERAL SEVERAL_DRIVABLE DONE",
+                &[0, 0, 60, 0, 0, 0],
+            ),
             (
                 "ND UNKNOWN UNKNOWN_OLD STUCK GYRO FAULT",
                 &[0, 0, 0, 28, 32, 0],

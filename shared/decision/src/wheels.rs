@@ -1,9 +1,11 @@
-//! Which wheel an action is about, and how its fault is steered against.
+//! Which wheels an action is about, and how their faults are steered against.
 
-use vigil_blocks::{Action, FAULT_NODES, FaultBelief, RecoveryKind};
+use vigil_blocks::RecoveryKind;
+use vigil_blocks::{Action, AnsweredWheels, FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet};
 use vigil_pomdp::Pomdp;
 use vigil_robot::{Description, FaultTree};
 
+use crate::drivable::DrivableSets;
 use crate::error::SupervisorError;
 use crate::mapping::{self, ActionMeaning, Compensation};
 use crate::states::{self, Leaf, LeafKind};
@@ -14,13 +16,15 @@ const NAMED: f64 = 0.5;
 /// the belief over states.
 const MOVED: f64 = 0.05;
 
-/// The faults of wheels as the identifier holds them, and the wheel of the present action.
+/// The faults of wheels as the identifier holds them, and the wheels of the present action.
 pub(crate) struct Wheels {
     leaves: Vec<Leaf>,
-    /// Probability of every node of the tree, as of the last decision.
+    /// Probability of every node of the tree, and the most probable sets, as of the last decision.
     p: [f64; FAULT_NODES],
+    sets: [FaultSet; FAULT_SETS],
+    drivable: DrivableSets,
     compensation: Vec<Compensation>,
-    about: Option<usize>,
+    about: AnsweredWheels,
 }
 
 impl Wheels {
@@ -36,22 +40,39 @@ impl Wheels {
         let leaves = states::leaves(tree, robot);
         mapping::check_compensation(model, &leaves, actions, &compensation)?;
         Ok(Self {
+            drivable: DrivableSets::new(&leaves, robot, &compensation),
             leaves,
             p: [0.0; FAULT_NODES],
+            sets: [FaultSet { leaves: 0, p: 0.0 }; FAULT_SETS],
             compensation,
-            about: None,
+            about: AnsweredWheels {
+                stuck: 0,
+                encoders: 0,
+            },
         })
     }
 
     /// Nothing is known of any.
     pub(crate) const fn forget(&mut self) {
         self.p = [0.0; FAULT_NODES];
-        self.about = None;
+        self.sets = [FaultSet { leaves: 0, p: 0.0 }; FAULT_SETS];
+        self.about = AnsweredWheels {
+            stuck: 0,
+            encoders: 0,
+        };
     }
 
     /// What the identifier says now is what the next decision is about.
-    pub(crate) const fn take(&mut self, diagnosis: &FaultBelief) {
+    pub(crate) fn take(&mut self, diagnosis: &FaultBelief) {
         self.p = diagnosis.p;
+        self.sets = diagnosis.sets;
+        let unused = self.sets.iter_mut().skip(diagnosis.set_count as usize);
+        unused.for_each(|set| set.p = 0.0);
+    }
+
+    /// The sets that an action can answer as one.
+    pub(crate) const fn drivable(&self) -> &DrivableSets {
+        &self.drivable
     }
 
     /// Leaves of one state are treated alike, but for the wheel.
@@ -63,51 +84,83 @@ impl Wheels {
             .any(|moved| moved > MOVED)
     }
 
-    /// The wheel that an action of `kind` is about; `goes_on` if it is the action before. A way
+    /// The wheels that an action of `kind` is about; `goes_on` if it is the action before. A way
     /// through an opening is driven as well as the robot can.
     pub(crate) fn choose(&mut self, kind: RecoveryKind, goes_on: bool) {
         let about = match kind {
             RecoveryKind::Compensate => self.most_probable(LeafKind::Stuck),
             RecoveryKind::IgnoreEncoder => self.most_probable(LeafKind::Encoder),
+            RecoveryKind::LimpHome => self.most_probable_set(),
             RecoveryKind::GoThrough => self
                 .most_probable(LeafKind::Stuck)
                 .filter(|(_, p)| *p > NAMED),
             _ => None,
         };
-        // Another wheel than that of the action that goes on has to be more likely than not.
-        let held = self.about.filter(|_| goes_on);
-        let other = about.filter(|(_, p)| held.is_none() || *p > NAMED);
-        self.about = other.map(|(wheel, _)| wheel).or(held);
+        // Other wheels than those of the action that goes on have to be more likely than not.
+        let held = self.about;
+        let is_held = goes_on && !held.is_empty();
+        let other = about.filter(|(_, p)| !is_held || *p > NAMED);
+        self.about = match other {
+            Some((wheels, _)) => wheels,
+            None if is_held => held,
+            None => AnsweredWheels::default(),
+        };
     }
 
-    /// The wheel of the present action.
-    pub(crate) const fn about(&self) -> Option<usize> {
+    /// The wheels of the present action.
+    pub(crate) const fn about(&self) -> AnsweredWheels {
         self.about
     }
 
-    /// Writes how the wheel of an action of `kind` is steered against.
+    /// Writes how the stuck wheels of an action of `kind` are steered against. The robot then
+    /// drives the curvature κ, commanded `gain·κ + offset`; what several wheels need adds up.
     pub(crate) fn write(&self, kind: RecoveryKind, action: &mut Action) {
-        let steers = matches!(kind, RecoveryKind::Compensate | RecoveryKind::GoThrough);
-        let wheel = self.about.filter(|_| steers);
-        let counter = wheel.and_then(|wheel| self.compensation.iter().find(|c| c.wheel == wheel));
-        if let Some(counter) = counter {
-            action.curvature_gain = counter.curvature_gain;
-            action.curvature_offset = counter.curvature_offset_1_m;
+        let steers = matches!(
+            kind,
+            RecoveryKind::Compensate | RecoveryKind::GoThrough | RecoveryKind::LimpHome
+        );
+        if !steers {
+            return;
+        }
+        let is_about = |it: &&Compensation| self.about.has_stuck(it.wheel);
+        let mut count = 0;
+        for counter in self.compensation.iter().filter(is_about) {
+            action.curvature_gain = match count {
+                0 => counter.curvature_gain,
+                _ => action.curvature_gain + counter.curvature_gain - 1.0,
+            };
+            action.curvature_offset += counter.curvature_offset_1_m;
+            count += 1;
         }
     }
 
     /// The wheel with such a fault, and its probability.
-    fn most_probable(&self, kind: LeafKind) -> Option<(usize, f64)> {
-        let mut best: Option<(usize, f64)> = None;
-        for leaf in self.leaves.iter().filter(|leaf| leaf.kind == kind) {
+    fn most_probable(&self, kind: LeafKind) -> Option<(AnsweredWheels, f64)> {
+        let of_kind = self.leaves.iter().filter(|leaf| leaf.kind == kind);
+        let found = of_kind.filter_map(|leaf| {
             let p = self.p.get(leaf.node).copied().unwrap_or(0.0);
-            let is_more = p > best.map_or(0.0, |(_, most)| most);
-            best = leaf
-                .wheel
-                .filter(|_| is_more)
-                .map(|wheel| (wheel, p))
-                .or(best);
-        }
-        best
+            let wheels = match kind {
+                LeafKind::Encoder => AnsweredWheels::one_encoder(leaf.wheel?),
+                _ => AnsweredWheels::one_stuck(leaf.wheel?),
+            };
+            Some((wheels, p))
+        });
+        first_largest(found)
     }
+
+    /// The wheels of the set that can be driven home with, and its probability.
+    fn most_probable_set(&self) -> Option<(AnsweredWheels, f64)> {
+        let sets = self.sets.iter();
+        let drivable = sets.filter(|set| self.drivable.holds(set.leaves));
+        first_largest(drivable.map(|set| (self.drivable.answered(set.leaves), set.p)))
+    }
+}
+
+/// The first of the largest probability above 0.
+fn first_largest(
+    found: impl Iterator<Item = (AnsweredWheels, f64)>,
+) -> Option<(AnsweredWheels, f64)> {
+    found
+        .filter(|(_, p)| *p > 0.0)
+        .reduce(|best, it| if it.1 > best.1 { it } else { best })
 }

@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use vigil_blocks::WHEELS;
+use vigil_blocks::{AnsweredWheels, WHEELS};
 use vigil_inference::track::MotionNoise;
 
 use crate::body::Body;
@@ -360,5 +360,16 @@ impl Description {
     #[must_use]
     pub fn wheel_index(&self, name: &str) -> Option<usize> {
         self.wheels.iter().position(|wheel| wheel.name == name)
+    }
+
+    /// An action's name, and the wheels that it is about after a colon: `limp_home:LF+RM`.
+    #[must_use]
+    pub fn action_text(&self, action: &str, wheels: AnsweredWheels) -> String {
+        let name = |wheel: usize| self.wheels.get(wheel).map(|it| it.name.as_str());
+        let names: Vec<&str> = wheels.wheels().filter_map(name).collect();
+        match names.is_empty() {
+            true => action.to_owned(),
+            false => format!("{action}:{}", names.join("+")),
+        }
     }
 }

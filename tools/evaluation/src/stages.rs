@@ -186,17 +186,14 @@ impl Vocabulary {
         }
     }
 
-    /// The action's name, and the wheel that it is about after a colon.
+    /// The action's name, and the wheels that it is about after a colon.
     fn action(&self, action: &Action) -> String {
         if order(action) == RobotOrder::Blind {
             return SAFE_STOP.to_owned();
         }
         let name = self.actions.get(action.action as usize);
         let name = name.map_or("?", String::as_str);
-        match self.robot.wheels.get(action.wheel as usize) {
-            Some(wheel) => format!("{name}:{}", wheel.name),
-            None => name.to_owned(),
-        }
+        self.robot.action_text(name, action.answered())
     }
 }
 
@@ -222,6 +219,7 @@ fn order(action: &Action) -> RobotOrder {
         RecoveryKind::CallForHelp => RobotOrder::Help,
         RecoveryKind::Compensate
         | RecoveryKind::IgnoreEncoder
+        | RecoveryKind::LimpHome
         | RecoveryKind::NewPath
         | RecoveryKind::Relocalise
         | RecoveryKind::GoThrough

@@ -5,9 +5,10 @@
 //! 3. Then do what the most probable explanation asks for, if it is probable enough: counter-steer
 //!    against a stuck wheel, ignore a broken encoder, go on if nothing is wrong; else creep.
 //! 4. If another explanation is the most probable for a while, begin again at 2; after so many
-//!    looks, or so much creeping without an explanation, call for help and wait. So it does, if it
-//!    is told to, as soon as there are several faults: it can only answer one.
-//! 5. If the alarm has gone and nothing is wrong for a while, drive as planned.
+//!    looks, or so much creeping without an explanation, call for help and wait.
+//! 5. As soon as there are several faults, answer all of them or call for help, if it is told to:
+//!    else it answers one.
+//! 6. If the alarm has gone and nothing is wrong for a while, drive as planned.
 
 use serde::{Deserialize, Serialize};
 use vigil_blocks::RecoveryKind;
@@ -43,12 +44,14 @@ pub struct CarefulSettings {
     pub looks_max: u32,
     /// Least probability of an explanation to act on.
     pub p_min: f64,
-    /// True to call for help when there are several faults.
+    /// True to answer all of several faults with which the rover can be driven.
+    pub limps_home: bool,
+    /// True to call for help when there are several faults otherwise.
     pub calls_for_several: bool,
 }
 
 impl CarefulSettings {
-    pub(super) const DIMENSIONS: usize = 7;
+    pub(super) const DIMENSIONS: usize = 8;
 
     pub(super) fn varied(self, dimension: usize) -> Vec<Self> {
         let looking = [Looking::Stop, Looking::SlowDown, Looking::GoOn];
@@ -68,6 +71,9 @@ impl CarefulSettings {
                 .to_vec(),
             5 => [0.0, 0.5, 0.8, 0.95]
                 .map(|p_min| Self { p_min, ..self })
+                .to_vec(),
+            6 => [false, true]
+                .map(|limps_home| Self { limps_home, ..self })
                 .to_vec(),
             _ => [false, true]
                 .map(|calls_for_several| Self {
@@ -117,6 +123,10 @@ impl Careful {
     /// The rule's answer, `dt_s` after the last cycle.
     pub fn answer(&mut self, input: RuleInput, dt_s: f64) -> RuleOutput {
         let input = self.credible(input);
+        let is_answered = input.several && self.settings.limps_home && self.phase != Phase::Waiting;
+        if let Some(order) = input.limp_home.filter(|_| is_answered) {
+            return order;
+        }
         self.phase = match self.phase {
             _ if input.several && self.settings.calls_for_several => Phase::Waiting,
             Phase::Driving if input.alarm => self.look(),
@@ -200,6 +210,7 @@ mod tests {
         creep_s: 2.0,
         looks_max: 2,
         p_min: 0.5,
+        limps_home: true,
         calls_for_several: true,
     };
 
@@ -214,10 +225,12 @@ mod tests {
                     explanation,
                     p: 0.9,
                     several: false,
+                    limp_home: None,
                 };
                 let output = rule.answer(input, 0.1);
-                if said.last() != Some(&(output.kind, output.wheel)) {
-                    said.push((output.kind, output.wheel));
+                let wheel = output.wheels.wheels().next();
+                if said.last() != Some(&(output.kind, wheel)) {
+                    said.push((output.kind, wheel));
                 }
             }
         }
@@ -247,6 +260,7 @@ mod tests {
             explanation: Some(Stuck(1)),
             p: 0.4,
             several: false,
+            limp_home: None,
         };
         let last = (0..40).map(|_| rule.answer(unsure, 0.1)).last().unwrap();
         assert_eq!(last.kind, CallForHelp);
@@ -258,6 +272,13 @@ mod tests {
             Careful::new(SETTINGS).answer(several, 0.1).kind,
             CallForHelp
         );
+        let limping = RuleOutput::limp_home([Stuck(1), Encoder(2)]);
+        let drivable = RuleInput {
+            limp_home: limping,
+            ..several
+        };
+        let answer = Careful::new(SETTINGS).answer(drivable, 0.1);
+        assert_eq!(Some(answer), limping);
     }
 
     #[test]

@@ -65,10 +65,14 @@ def _judged(verdict):
     return (OK, f"no fault{slower}") if is_free else (WARN, f"no alarm: {action}")
 
 
+def _numbers(bits):
+    """Wheels, by their numbers in the robot's description."""
+    return " ".join(str(i) for i in range(16) if bits >> i & 1) or "none"
+
+
 def _values(verdict):
     """What there is to know, as words."""
     kind = KINDS.get(verdict.kind, str(verdict.kind))
-    wheel = "none" if verdict.wheel == 2**32 - 1 else str(verdict.wheel)
     return [
         ("mode", _text(verdict.mode_name)),
         ("probability", f"{verdict.p_mode:.3f}"),
@@ -76,7 +80,8 @@ def _values(verdict):
         ("size", _size(verdict)),
         ("action", _text(verdict.action_name)),
         ("kind of action", kind),
-        ("wheel", wheel),
+        ("stuck wheels", _numbers(verdict.stuck_wheels)),
+        ("broken encoders", _numbers(verdict.broken_encoders)),
         ("speed scale", f"{verdict.speed_scale:.3f}"),
         ("curvature gain", f"{verdict.curvature_gain:.3f}"),
         ("curvature offset, 1/m", f"{verdict.curvature_offset:.4f}"),

@@ -39,7 +39,8 @@ impl Task {
             RecoveryKind::GoOn
             | RecoveryKind::SlowDown
             | RecoveryKind::Compensate
-            | RecoveryKind::IgnoreEncoder => Self::Follow,
+            | RecoveryKind::IgnoreEncoder
+            | RecoveryKind::LimpHome => Self::Follow,
             RecoveryKind::CallForHelp => Self::Wait { passed_s },
             RecoveryKind::NewPath => Self::Plan { passed_s },
             RecoveryKind::Relocalise => Self::Locate { passed_s },

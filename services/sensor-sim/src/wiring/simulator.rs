@@ -179,8 +179,8 @@ impl Source for SimulatorSource {
             && self.executed != self.executed_published
             && let Some(action) = self.actions.newest()
         {
-            let (what, wheel) = (action.action, u64::from(action.wheel));
-            health.event(now_ns, EventKind::Obeys, what, 0.0, wheel);
+            let (what, wheels) = (action.action, action.answered().to_event());
+            health.event(now_ns, EventKind::Obeys, what, 0.0, wheels);
             self.executed_published = self.executed;
         }
         match self.event.take() {

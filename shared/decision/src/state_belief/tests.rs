@@ -33,7 +33,8 @@ fn weighed<const N: usize>(
         (set.leaves, set.p) = (*leaves, *p);
     }
     let mut out = [0.0; N];
-    write_weights(&said, states, true, &[0.0; N], &mut out);
+    let drivable = DrivableSets::none();
+    write_weights(&said, states, &drivable, true, &[0.0; N], &mut out);
     out
 }
 
@@ -85,7 +86,14 @@ fn before_an_alarm_the_unknown_is_nominal() {
         (false, [0.875, 0.125, 0.0, 0.0]),
     ] {
         let mut found = [0.0; 4];
-        write_weights(&said, &STATES, alarm, &[0.25; 4], &mut found);
+        write_weights(
+            &said,
+            &STATES,
+            &DrivableSets::none(),
+            alarm,
+            &[0.25; 4],
+            &mut found,
+        );
         near(&found, &wanted);
     }
     // What two readers rounded apart is still a probability.
@@ -93,6 +101,7 @@ fn before_an_alarm_the_unknown_is_nominal() {
     write_weights(
         &diagnosis(&[0.9], 0.9),
         &STATES,
+        &DrivableSets::none(),
         false,
         &[0.25; 4],
         &mut found,
@@ -111,7 +120,14 @@ fn states_of_the_unknown_share_it_as_predicted_and_the_end_is_never_believed() {
         ([1.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0]),
     ] {
         let mut found = [0.0; 4];
-        write_weights(&said, &states, true, &predicted, &mut found);
+        write_weights(
+            &said,
+            &states,
+            &DrivableSets::none(),
+            true,
+            &predicted,
+            &mut found,
+        );
         near(&found, &wanted);
     }
 }

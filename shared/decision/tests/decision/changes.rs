@@ -11,7 +11,8 @@ fn world(switching_cost: f64) -> World {
 }
 
 fn wheel(world: &World) -> Option<&str> {
-    let wheel = world.robot.wheels.get(world.action.wheel as usize);
+    let wheel = world.action.answered().wheels().next();
+    let wheel = wheel.and_then(|wheel| world.robot.wheels.get(wheel));
     wheel.map(|wheel| wheel.name.as_str())
 }
 

@@ -1,7 +1,9 @@
 //! The shipped decision model behind the supervisor: what it does in which situation.
 
 use proptest::prelude::*;
-use vigil_blocks::{ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
+use vigil_blocks::{
+    AnsweredWheels, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind,
+};
 use vigil_cycle::allocation::allocations;
 use vigil_decision::{Compensation, Inputs, Supervisor};
 use vigil_pomdp::{Policy, Pomdp, QMdp, mdp};
@@ -54,7 +56,7 @@ fn a_named_stuck_wheel_is_compensated_in_the_cycle_that_names_it() {
     world.cycle(true, &named, &named);
     assert_eq!(world.kind(), RecoveryKind::Compensate);
     let wheel = world.robot.wheel_index("RM").unwrap();
-    assert_eq!(world.action.wheel as usize, wheel);
+    assert_eq!(world.action.answered(), AnsweredWheels::one_stuck(wheel));
     assert_eq!(
         (world.action.curvature_gain, world.action.curvature_offset),
         (1.1, wheel as f64)

@@ -1,6 +1,8 @@
 //! Navigation and hardware in one model: what identifier and detector say about hardware.
 
-use vigil_blocks::{ActionOutcome, ControlMode, Entry, Readiness, RecoveryKind, Symptoms};
+use vigil_blocks::{
+    ActionOutcome, AnsweredWheels, ControlMode, Entry, Readiness, RecoveryKind, Symptoms,
+};
 use vigil_decision::Inputs;
 
 use crate::navigation::{CYCLE_NS, JOINT, Navigation, build, joint_settings};
@@ -13,8 +15,8 @@ fn a_stuck_wheel_is_steered_against_also_through_an_opening() {
     robot.cycle(0);
     assert_eq!(robot.kind(), RecoveryKind::Compensate);
     assert_eq!(
-        (robot.action.wheel, robot.action.curvature_offset),
-        (4, 0.4)
+        (robot.action.stuck_wheels, robot.action.curvature_offset),
+        (1 << 4, 0.4)
     );
     assert!((robot.p("STUCK") - 0.95).abs() < 1e-9);
     let asked = robot.action.decision_seq;
@@ -33,8 +35,8 @@ fn a_stuck_wheel_is_steered_against_also_through_an_opening() {
     }
     assert_eq!(robot.kind(), RecoveryKind::GoThrough);
     assert_eq!(
-        (robot.action.wheel, robot.action.curvature_offset),
-        (4, 0.4)
+        (robot.action.stuck_wheels, robot.action.curvature_offset),
+        (1 << 4, 0.4)
     );
     assert!(
         (robot.p("STUCK") - 0.95).abs() < 1e-9,
@@ -48,8 +50,8 @@ fn a_stuck_wheel_is_steered_against_also_through_an_opening() {
     robot.identify("LF_STUCK", 0.95);
     robot.cycle(0);
     assert_eq!(
-        (robot.action.wheel, robot.action.curvature_offset),
-        (0, 0.0)
+        (robot.action.stuck_wheels, robot.action.curvature_offset),
+        (1, 0.0)
     );
 }
 
@@ -60,14 +62,14 @@ fn a_broken_encoder_is_ignored_and_mended_ones_are_forgotten() {
     robot.identify("LM_ENC", 0.97);
     robot.cycle(0);
     assert_eq!(
-        (robot.kind(), robot.action.wheel),
-        (RecoveryKind::IgnoreEncoder, 1)
+        (robot.kind(), robot.action.answered()),
+        (RecoveryKind::IgnoreEncoder, AnsweredWheels::one_encoder(1))
     );
     robot.nothing();
     robot.rest(1.0, 0);
     assert_eq!(
-        (robot.kind(), robot.action.wheel),
-        (RecoveryKind::GoOn, u32::MAX)
+        (robot.kind(), robot.action.answered()),
+        (RecoveryKind::GoOn, AnsweredWheels::default())
     );
     assert!(robot.p("ENCODER") < 1e-3);
 }

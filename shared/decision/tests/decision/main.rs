@@ -8,6 +8,7 @@ mod changes;
 mod decisions;
 mod exceptions;
 mod hardware;
+mod limping;
 mod navigation;
 mod planning;
 mod policies;

@@ -12,7 +12,7 @@ use vigil_blocks::{FaultBelief, SizeKind, WHEELS};
 use vigil_inference::logspace::log_add;
 use vigil_robot::learned::current_effects::{CurrentEffects, SHARES, STUCK};
 use vigil_robot::learned::further_watch::{FurtherWatch, Residual, Residuals, Turn};
-use vigil_robot::learned::wheel_evidence::TOGETHER_SD;
+use vigil_robot::learned::wheel_evidence::DRAG_SD;
 use vigil_robot::learned::{Further, Healthy, Model, Observation};
 use vigil_robot::{Description, FaultPrior, Suspects};
 
@@ -285,7 +285,7 @@ impl FurtherFilter {
                     let wide = residual.variance + self.wide.turn_rad_s * self.wide.turn_rad_s;
                     log_add(0.0, shifted(residual, 0.0, wide)) - std::f64::consts::LN_2
                 });
-                let sd = |by: f64| (TOGETHER_SD * by).abs().max(self.wide.stuck_a);
+                let sd = |by: f64| (DRAG_SD * by).abs().max(self.wide.stuck_a);
                 turns + together(beside, &by, sd)
             }
             FurtherState::CurrentOffset(wheel, offset) => alone(wheel, offset),

@@ -1,17 +1,17 @@
-//! By how much more than expected several dragging wheels change the others' rates: learned on the
-//! way.
+//! By how much more than expected dragging wheels change the others' rates: learned on the way.
 //!
-//! Nothing was learned of such wheels together, so that the expected rates are wrong by more than
-//! noise, and always alike. Taken as noise it would count again in every observation, and a true
-//! pair would lose to a dead encoder with time.
+//! One drags otherwise on another ground, and of several together nothing was learned: the expected
+//! rates are wrong by more than noise, and always alike. Taken as noise it would count again in
+//! every observation. A true pair would lose to a dead encoder with time; and one stuck wheel beside
+//! a dead encoder would lose to a pair that learns.
 
 use vigil_blocks::WHEELS;
 use vigil_robot::learned::wheel_context::FAR_SD;
-use vigil_robot::learned::wheel_evidence::{TOGETHER_SD, WheelDrag};
+use vigil_robot::learned::wheel_evidence::{DRAG_SD, WheelDrag};
 use vigil_robot::learned::{Model, Observation, WheelEvidence};
 
 /// Deviation by which the offset drifts from one observation to the next: the ground changes. It
-/// reaches [`TOGETHER_SD`] in 1600 of them, 80 s: a tolerance's length, 8 m, at 0.1 m/s.
+/// reaches [`DRAG_SD`] in 1600 of them, 80 s: a tolerance's length, 8 m, at 0.1 m/s.
 const DRIFT_SD: f64 = 0.01;
 
 /// Gaussian beliefs about the offsets relative to the expected change, one per wheel: a scalar
@@ -26,7 +26,7 @@ impl Default for RateOffsets {
     fn default() -> Self {
         Self {
             mean: [0.0; WHEELS],
-            variance: [TOGETHER_SD * TOGETHER_SD; WHEELS],
+            variance: [DRAG_SD * DRAG_SD; WHEELS],
         }
     }
 }
@@ -80,7 +80,7 @@ impl RateOffsets {
             self.variance[wheel] *= 1.0 - gain * dragged.change_rad_s;
         }
         let drifted = self.variance[wheel] + DRIFT_SD * DRIFT_SD;
-        self.variance[wheel] = drifted.min(TOGETHER_SD * TOGETHER_SD);
+        self.variance[wheel] = drifted.min(DRAG_SD * DRAG_SD);
     }
 }
 
@@ -110,7 +110,7 @@ mod tests {
             assert!((rate - (2.0 + 1.5 * change)).abs() < 0.01, "{rate}");
             assert!(variance < 0.002, "{variance}");
         }
-        let prior = TOGETHER_SD * TOGETHER_SD * 0.09 + 0.001;
+        let prior = DRAG_SD * DRAG_SD * 0.09 + 0.001;
         let (rate, variance) = offsets.expected(2, &dragged(-0.3));
         assert!((rate - 1.7).abs() < 1e-12 && (variance - prior).abs() < 1e-12);
     }
@@ -119,7 +119,7 @@ mod tests {
     fn one_reading_is_the_conjugate_normal() {
         let mut offsets = RateOffsets::default();
         offsets.update(0, &dragged(0.5), 2.9, 0.02);
-        let (prior, reading) = (1.0 / (TOGETHER_SD * TOGETHER_SD), 0.25 / 0.021);
+        let (prior, reading) = (1.0 / (DRAG_SD * DRAG_SD), 0.25 / 0.021);
         let mean = reading * 0.8 / (prior + reading);
         let variance = 1.0 / (prior + reading) + DRIFT_SD * DRIFT_SD;
         let (rate, total) = offsets.expected(0, &dragged(0.5));

@@ -160,11 +160,11 @@ impl MotionMode {
         self.moved == Mover::Nominal || self.jump != [0.0; 3]
     }
 
-    /// True if this wheel turns in a way of which nothing was learned before.
+    /// True if this wheel's rate is learned on the way: others drag, or it stands askew.
     #[must_use]
     pub fn turns_anyhow(&self, wheel: usize) -> bool {
         match self.moved {
-            Mover::Stuck(stuck) => stuck.count_ones() > 1 && !self.moved.is_stuck(wheel),
+            Mover::Stuck(_) => !self.moved.is_stuck(wheel),
             Mover::Steer(askew) => askew == wheel,
             _ => false,
         }

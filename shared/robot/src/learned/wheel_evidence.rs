@@ -35,14 +35,11 @@ pub const BREAKAGE_SHARES: [f64; BREAKAGES.len()] = [0.32, 0.32, 0.32, 0.04];
 /// drags.
 const TAIL: f64 = 0.02;
 const TAIL_DRAGGED: f64 = 0.1;
-/// Several dragging wheels change the others' rates in a way of which nothing was learned: its
-/// deviation from what is expected, relative to it. Chosen: what the equilibrium leaves out; the
-/// rest is learned on the way.
-pub const TOGETHER_SD: f64 = 0.4;
-/// Deviation of the change that one dragging wheel makes on any ground, relative to that learned.
-/// Chosen: two deviations span none of it to twice.
-const GROUND_SD: f64 = 0.5;
-/// What a wheel that stands askew may change of its own rate, relative to it: with [`TOGETHER_SD`]
+/// What dragging wheels change of the others' rates: its deviation from what is expected, relative
+/// to it. One drags otherwise on another ground; of several together nothing was learned. Chosen:
+/// what the equilibrium leaves out; the rest is learned on the way.
+pub const DRAG_SD: f64 = 0.4;
+/// What a wheel that stands askew may change of its own rate, relative to it: with [`DRAG_SD`]
 /// a tenth is one deviation. Chosen: askew by 0.3 rad, rolling alone loses a twentieth.
 const ASKEW: f64 = 0.25;
 /// Share of the observations at an onset that hold the very moment. Of three to four within the
@@ -80,6 +77,14 @@ pub struct WheelDrag {
     pub change_rad_s: f64,
     /// Variance about it from one observation to the next, (rad/s)².
     pub variance: f64,
+}
+
+impl WheelDrag {
+    /// Variance of the rate where nothing of the change was learned on the way, (rad/s)².
+    fn variance_anywhere(&self) -> f64 {
+        let sd = DRAG_SD * self.change_rad_s;
+        self.variance + sd * sd
+    }
 }
 
 impl WheelEvidence {
@@ -162,13 +167,9 @@ impl WheelEvidence {
                 MOMENT.ln() + self.any[i],
             ),
             moved if moved.is_stuck(i) => self.standing(i),
-            Mover::Stuck(stuck) => {
+            Mover::Stuck(_) => {
                 let dragged = self.dragged(model, observation, mode, i);
-                let sd = match stuck.count_ones() {
-                    0 | 1 => 0.0,
-                    _ => TOGETHER_SD * dragged.change_rad_s,
-                };
-                let variance = dragged.variance + sd * sd;
+                let variance = dragged.variance_anywhere();
                 let dragged = self.turning(model, observation, i, dragged.rate_rad_s, variance);
                 either(dragged, self.healthy[i])
             }
@@ -206,11 +207,8 @@ impl WheelEvidence {
             // Not the sum: more stuck wheels must not always be the less likely ones.
             variance = variance.max(its);
         }
-        match mode.moved.stuck().count_ones() {
-            0 => variance = nominal_variance,
-            // The ground changes what one does; what several do is learned on the way.
-            1 => variance += GROUND_SD * GROUND_SD * change * change,
-            _ => {}
+        if mode.moved.stuck() == 0 {
+            variance = nominal_variance;
         }
         // A wheel that stands askew is turned by the ground, too.
         let askew = if mode.moved == Mover::Steer(i) {
@@ -240,7 +238,8 @@ impl WheelEvidence {
         (reading.plain > 0).then(|| RateResidual {
             residual_rad_s: reading.mean - (dragged.rate_rad_s - shift),
             rolling_rad_s: self.rolling[i].0,
-            variance: dragged.variance - uncertain + self.sample_variance(i, reading.plain),
+            variance: dragged.variance_anywhere() - uncertain
+                + self.sample_variance(i, reading.plain),
         })
     }
 
@@ -262,13 +261,9 @@ impl WheelEvidence {
             };
         }
         let dragged = self.dragged(model, observation, mode, i);
-        let sd = match mode.moved.stuck().count_ones() {
-            1 => 0.0,
-            _ => TOGETHER_SD * dragged.change_rad_s,
-        };
         ExpectedRate {
             mean_rad_s: dragged.rate_rad_s,
-            variance: dragged.variance + sd * sd,
+            variance: dragged.variance_anywhere(),
             tail: TAIL_DRAGGED,
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::model_text::{line, number};
 
-use super::parameters::{ActionParameters, Fault, ParameterError, Parameters};
+use super::parameters::{ActionParameters, DRIVABLE, Drivable, Fault, ParameterError, Parameters};
 
 const HEAD: &str = "\
 # What to do about a fault. Generated: change the parameters, not this file.
@@ -17,6 +17,7 @@ enum Condition<'a> {
     Nominal,
     Fault(&'a Fault),
     Several,
+    Drivable(Drivable),
     Unknown { is_old: bool },
     Done,
 }
@@ -116,10 +117,13 @@ fn states(parameters: &Parameters) -> Vec<State<'_>> {
     let state = |name, condition| State { name, condition };
     let faults = parameters.fault.iter();
     let faults = faults.map(|fault| state(fault.state.as_str(), Condition::Fault(fault)));
+    let drivable = parameters.several.drivable.into_iter();
+    let drivable = drivable.map(|of| state(DRIVABLE, Condition::Drivable(of)));
     std::iter::once(state("ND", Condition::Nominal))
         .chain(faults)
+        .chain([state("SEVERAL", Condition::Several)])
+        .chain(drivable)
         .chain([
-            state("SEVERAL", Condition::Several),
             state("UNKNOWN", Condition::Unknown { is_old: false }),
             state("UNKNOWN_OLD", Condition::Unknown { is_old: true }),
             state("DONE", Condition::Done),
@@ -200,7 +204,11 @@ impl Model<'_> {
         match (from, to) {
             (_, Condition::Done) => task.speed_m_s * action.speed_scale / task.rest_m,
             (Condition::Fault(fault), Condition::Nominal) => fault.passes_1_s,
-            (Condition::Fault(_), Condition::Several) => several.arises_1_s,
+            (Condition::Fault(_), Condition::Several) => {
+                let drivable = several.drivable.map_or(0.0, |it| it.share);
+                several.arises_1_s * (1.0 - drivable)
+            }
+            (Condition::Fault(_), Condition::Drivable(it)) => several.arises_1_s * it.share,
             (Condition::Unknown { is_old: false }, Condition::Nominal) => unknown.passes_1_s,
             (Condition::Unknown { is_old: false }, Condition::Fault(_)) => {
                 unknown.named_1_s / self.states.iter().filter(is_named).count() as f64
@@ -242,14 +250,17 @@ impl Model<'_> {
     fn price(&self, action: &ActionParameters, condition: Condition<'_>) -> f64 {
         let parameters = self.parameters;
         let scale = action.speed_scale;
-        let answers = |fault: &Fault| action.remedies.as_deref() == Some(fault.state.as_str());
+        let answers = |state: &str| action.remedies.as_deref() == Some(state);
         let (price_1_m, is_answered) = match condition {
             Condition::Nominal | Condition::Done => (0.0, false),
-            Condition::Fault(fault) => match fault.remedied_1_m.filter(|_| answers(fault)) {
-                Some(remedied_1_m) => (remedied_1_m, true),
-                None => (fault.price_1_m * scale, false),
+            Condition::Fault(fault) => match fault.remedied_1_m {
+                Some(remedied_1_m) if answers(&fault.state) => (remedied_1_m, true),
+                _ => (fault.price_1_m * scale, false),
             },
-            Condition::Several => (parameters.several.price_1_m * scale, false),
+            Condition::Drivable(it) if answers(DRIVABLE) => (it.remedied_1_m, true),
+            Condition::Several | Condition::Drivable(_) => {
+                (parameters.several.price_1_m * scale, false)
+            }
             Condition::Unknown { .. } => (parameters.unknown.price_1_m * scale, false),
         };
         let needless_1_m = if is_answered {

@@ -2,6 +2,9 @@
 
 use serde::Deserialize;
 
+/// Name of the state of several faults with which a robot can be driven home.
+pub(super) const DRIVABLE: &str = "SEVERAL_DRIVABLE";
+
 /// Everything that the model is made from. Prices are in units of the
 /// user's choice, the same for all.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -95,6 +98,18 @@ pub struct Several {
     pub arises_1_s: f64,
     /// Price of a metre at full speed.
     pub price_1_m: f64,
+    /// Those with which a robot can be driven home.
+    pub drivable: Option<Drivable>,
+}
+
+/// Two faults or more with which a robot can be driven home: the state `SEVERAL_DRIVABLE`.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Drivable {
+    /// Their share of the faults that join one, 0 to 1.
+    pub share: f64,
+    /// Price of a metre where all are answered, whatever the speed.
+    pub remedied_1_m: f64,
 }
 
 /// What nothing explains.
@@ -139,11 +154,15 @@ pub enum ParameterError {
     },
     /// Two states have one name.
     #[error(
-        "state '{0}' appears twice; ND, SEVERAL, UNKNOWN, UNKNOWN_OLD and DONE are always there"
+        "state '{0}' appears twice; ND, SEVERAL, SEVERAL_DRIVABLE, UNKNOWN, UNKNOWN_OLD and DONE \
+         have a meaning of their own"
     )]
     SameState(String),
     /// An action answers a fault that is not there.
-    #[error("action '{action}' remedies '{fault}', which is the state of no [[fault]]")]
+    #[error(
+        "action '{action}' remedies '{fault}'; allowed is the state of a [[fault]], and with \
+         [several.drivable] SEVERAL_DRIVABLE"
+    )]
     NoFault {
         /// Name of the action.
         action: String,
@@ -196,7 +215,10 @@ impl Parameters {
         share("evidence.confused".into(), self.evidence.confused)?;
         let nominal = self.evidence.nominal_at_an_alarm;
         share("evidence.nominal_at_an_alarm".into(), nominal)?;
-        let always = ["ND", "SEVERAL", "UNKNOWN", "UNKNOWN_OLD", "DONE"];
+        if let Some(drivable) = self.several.drivable {
+            share("several.drivable.share".into(), drivable.share)?;
+        }
+        let always = ["ND", "SEVERAL", DRIVABLE, "UNKNOWN", "UNKNOWN_OLD", "DONE"];
         for (at, fault) in self.fault.iter().enumerate() {
             let before = self.fault[..at].iter().map(|other| other.state.as_str());
             if before.chain(always).any(|name| name == fault.state) {
@@ -213,7 +235,11 @@ impl Parameters {
             let key = format!("action {}.sees, with what is confused", action.name);
             share(key, seen)?;
             let remedied = action.remedies.as_deref();
-            let is_there = |state: &str| self.fault.iter().any(|fault| fault.state == state);
+            let has_drivable = self.several.drivable.is_some();
+            let is_there = |state: &str| {
+                let of_faults = self.fault.iter().any(|fault| fault.state == state);
+                of_faults || (has_drivable && state == DRIVABLE)
+            };
             if let Some(state) = remedied.filter(|state| !is_there(state)) {
                 return Err(ParameterError::NoFault {
                     action: action.name.clone(),
@@ -241,6 +267,10 @@ impl Parameters {
         ]
         .map(|(key, found)| (key.to_owned(), found))
         .to_vec();
+        if let Some(drivable) = several.drivable {
+            let key = "several.drivable.remedied_1_m".to_owned();
+            amounts.push((key, drivable.remedied_1_m));
+        }
         for fault in &self.fault {
             let key = |name: &str| format!("fault {}.{name}", fault.state);
             amounts.push((key("arises_1_h"), fault.arises_1_h));

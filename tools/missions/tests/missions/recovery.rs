@@ -88,8 +88,9 @@ fn a_step_is_made_of_the_rates_and_prices_of_the_file() {
         let found = next.iter().find(|(s, _)| *s == state(&model, name));
         found.map_or(0.0, |(_, p)| *p)
     };
-    // 0.02 /s and 0.002 /s in 0.1 s, and 1.1 cm of 9 m.
-    assert!((to("ND") - 0.002).abs() < 1e-12 && (to("SEVERAL") - 0.0002).abs() < 1e-12);
+    // 0.02 /s and 0.002 /s in 0.1 s, four fifths of these drivable, and 1.1 cm of 9 m.
+    assert!((to("ND") - 0.002).abs() < 1e-12 && (to("SEVERAL") - 0.00004).abs() < 1e-12);
+    assert!((to("SEVERAL_DRIVABLE") - 0.00016).abs() < 1e-12);
     assert!((to("DONE") - 0.22 * 0.5 * 0.1 / 9.0).abs() < 1e-12);
     // Half of 200 a metre for 1.1 cm, and a tenth of a second.
     let price = |s: usize, a: &str| -model.reward(s, action(&model, a));
@@ -98,6 +99,10 @@ fn a_step_is_made_of_the_rates_and_prices_of_the_file() {
     let encoder = state(&model, "ENCODER");
     assert!((price(encoder, "compensate") - ((75.0 * 0.7 + 100.0) * 0.0154 + 0.1)).abs() < 1e-9);
     assert!((price(encoder, "call_for_help") - 330.0).abs() < 1e-9);
+    let both = state(&model, "SEVERAL_DRIVABLE");
+    assert!((price(both, "limp_home") - (15.0 * 0.0154 + 0.1)).abs() < 1e-9);
+    let alone = (280.0 * 0.7 + 100.0) * 0.0154 + 0.1;
+    assert!((price(both, "compensate") - alone).abs() < 1e-9);
     let start = model.start();
     let sum = 0.4 + 0.35 + 0.25 + 0.25;
     assert!((start[stuck] - 0.6 * parameters.fault[0].arises_1_h / sum).abs() < 1e-12);
@@ -124,6 +129,7 @@ fn the_solved_policy_calls_where_qmdp_waits_for_ever() {
         (&[("STUCK", 1.0)], "compensate"),
         (&[("ENCODER", 1.0)], "ignore_encoder"),
         (&[("SEVERAL", 1.0)], "call_for_help"),
+        (&[("SEVERAL_DRIVABLE", 1.0)], "limp_home"),
         (&[("ND", 0.5), ("UNKNOWN", 0.5)], "slow_down"),
     ] {
         assert_eq!(chosen(&mut solved, parts), wanted, "{parts:?}");

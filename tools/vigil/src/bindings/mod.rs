@@ -84,6 +84,7 @@ fn constants() -> Vec<(&'static str, String, u64)> {
         ("MOVE_AWAY", RecoveryKind::MoveAway),
         ("GIVE_UP", RecoveryKind::GiveUp),
         ("OWN", RecoveryKind::Own),
+        ("LIMP_HOME", RecoveryKind::LimpHome),
     ];
     all.extend(kinds.map(|(name, value)| ("RECOVERY", name.to_owned(), value as u64)));
     let modes = [

@@ -1,0 +1,129 @@
+//! Several faults at once, by the rover's shipped model and policy.
+
+use vigil_blocks::{Action, AnsweredWheels, DetectionBelief, Entry, FaultBelief, RecoveryKind};
+use vigil_decision::{Inputs, Supervisor};
+use vigil_setup::{Setup, load_graph};
+use vigil_supervisor::assemble;
+
+use crate::world::{CYCLE_NS, config};
+
+/// The shipped supervisor, and what the identifier holds.
+struct Rover {
+    setup: Setup,
+    supervisor: Supervisor,
+    t_ns: u64,
+    action: Action,
+}
+
+impl Rover {
+    fn new() -> Self {
+        let setup = load_graph(&config().join("rover.toml"), |_| {}).unwrap();
+        Self {
+            supervisor: assemble(&setup).unwrap(),
+            setup,
+            t_ns: 0,
+            action: Action::default(),
+        }
+    }
+
+    /// Twenty cycles in which these sets of leaves have these probabilities, and nothing else any.
+    fn believe(&mut self, sets: &[(&[&str], f64)]) -> RecoveryKind {
+        let mut diagnosis = FaultBelief {
+            tree_hash: self.setup.tree.hash(),
+            identifying: 1,
+            set_count: sets.len() as u32,
+            ..FaultBelief::default()
+        };
+        for (set, (leaves, p)) in diagnosis.sets.iter_mut().zip(sets) {
+            set.p = *p;
+            for leaf in *leaves {
+                let node = self.setup.tree.index(leaf).unwrap();
+                set.leaves |= 1 << node;
+                diagnosis.p[node] += p;
+            }
+        }
+        diagnosis.p_predicted = diagnosis.p;
+        for _ in 0..20 {
+            self.t_ns += CYCLE_NS;
+            diagnosis.header.t_capture_ns = self.t_ns;
+            let mut detection = DetectionBelief {
+                alarm: 1,
+                ..DetectionBelief::default()
+            };
+            detection.header.t_capture_ns = self.t_ns;
+            let inputs = Inputs {
+                diagnosis: Some(&diagnosis),
+                detection: Some(&detection),
+            };
+            self.supervisor.step(Entry::Frame(inputs), &mut self.action);
+        }
+        RecoveryKind::from_repr(self.action.kind).unwrap()
+    }
+
+    /// Gain and offset that steer against these wheels.
+    fn counter(&self, wheels: &[usize]) -> (f64, f64) {
+        let each = wheels.iter().map(|w| self.setup.model.compensation(*w));
+        each.fold((1.0, 0.0), |(gain, offset), one| {
+            (gain + one.0 - 1.0, offset + one.1)
+        })
+    }
+
+    fn demand_counter(&self, wheels: &[usize]) {
+        let (gain, offset) = self.counter(wheels);
+        let (found, at) = (self.action.curvature_gain, self.action.curvature_offset);
+        assert!((found - gain).abs() < 1e-12, "{found} {gain}");
+        assert!((at - offset).abs() < 1e-12, "{at} {offset}");
+    }
+}
+
+#[test]
+fn a_rover_limps_home_with_all_that_is_broken_answered() {
+    let mut rover = Rover::new();
+    assert_eq!(
+        rover.believe(&[(&["LF_STUCK"], 1.0)]),
+        RecoveryKind::Compensate
+    );
+    assert_eq!(rover.action.answered(), AnsweredWheels::one_stuck(0));
+    rover.demand_counter(&[0]);
+    let kind = rover.believe(&[(&["LF_STUCK", "RM_ENC"], 0.9), (&["LF_STUCK"], 0.1)]);
+    assert_eq!(kind, RecoveryKind::LimpHome);
+    let both = AnsweredWheels::one_stuck(0).with(AnsweredWheels::one_encoder(4));
+    assert_eq!(rover.action.answered(), both);
+    rover.demand_counter(&[0]);
+    assert!(rover.action.speed_scale < 1.0);
+    // Another set is answered once it is more likely than not; a change of it is a decision.
+    let asked = rover.action.decision_seq;
+    let other: &[&str] = &["LF_STUCK", "RR_STUCK"];
+    rover.believe(&[(&["LF_STUCK", "RM_ENC"], 0.52), (other, 0.48)]);
+    assert_eq!(
+        (rover.action.answered(), rover.action.decision_seq),
+        (both, asked)
+    );
+    rover.believe(&[(other, 0.55), (&["LF_STUCK", "RM_ENC"], 0.45)]);
+    let stuck = AnsweredWheels::one_stuck(0).with(AnsweredWheels::one_stuck(5));
+    assert_eq!(
+        (rover.action.answered(), rover.action.decision_seq),
+        (stuck, asked + 1)
+    );
+    rover.demand_counter(&[0, 5]);
+    // Mended again.
+    assert_eq!(
+        rover.believe(&[(&["RR_STUCK"], 1.0)]),
+        RecoveryKind::Compensate
+    );
+    assert_eq!(rover.action.answered(), AnsweredWheels::one_stuck(5));
+}
+
+#[test]
+fn two_stuck_wheels_on_one_side_are_called_help_for() {
+    for pair in [["LF_STUCK", "LM_STUCK"], ["RM_STUCK", "RR_STUCK"]] {
+        let mut rover = Rover::new();
+        assert_eq!(rover.believe(&[(&pair, 1.0)]), RecoveryKind::CallForHelp);
+        assert!(rover.action.answered().is_empty());
+    }
+    let mut rover = Rover::new();
+    let three: &[&str] = &["LF_ENC", "LM_ENC", "RR_ENC"];
+    assert_eq!(rover.believe(&[(three, 1.0)]), RecoveryKind::LimpHome);
+    assert_eq!(rover.action.broken_encoders, 0b10_0011);
+    rover.demand_counter(&[]);
+}
