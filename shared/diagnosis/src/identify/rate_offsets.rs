@@ -14,7 +14,7 @@ use vigil_robot::learned::{Model, Observation, WheelEvidence};
 /// reaches [`DRAG_SD`] in 1600 of them, 80 s: a tolerance's length, 8 m, at 0.1 m/s.
 const DRIFT_SD: f64 = 0.01;
 
-/// Gaussian beliefs about the offsets relative to the expected change, one per wheel: a scalar
+/// Gaussian beliefs about the offsets in units of [`WheelDrag::unit_rad_s`], one per wheel: a scalar
 /// Kalman filter each. Relative, as the change follows the command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RateOffsets {
@@ -63,7 +63,7 @@ impl RateOffsets {
 
     /// Rate (rad/s) and variance at which a wheel is expected, the offset included.
     fn expected(&self, wheel: usize, dragged: &WheelDrag) -> (f64, f64) {
-        let change = dragged.change_rad_s;
+        let change = dragged.unit_rad_s;
         (
             dragged.rate_rad_s + self.mean[wheel] * change,
             dragged.variance + self.variance[wheel] * change * change,
@@ -75,9 +75,9 @@ impl RateOffsets {
         let (expected, variance) = self.expected(wheel, dragged);
         let (residual, total) = (rate - expected, variance + noise);
         if residual * residual <= FAR_SD * FAR_SD * total {
-            let gain = self.variance[wheel] * dragged.change_rad_s / total;
+            let gain = self.variance[wheel] * dragged.unit_rad_s / total;
             self.mean[wheel] += gain * residual;
-            self.variance[wheel] *= 1.0 - gain * dragged.change_rad_s;
+            self.variance[wheel] *= 1.0 - gain * dragged.unit_rad_s;
         }
         let drifted = self.variance[wheel] + DRIFT_SD * DRIFT_SD;
         self.variance[wheel] = drifted.min(DRAG_SD * DRAG_SD);
@@ -92,6 +92,7 @@ mod tests {
         WheelDrag {
             rate_rad_s: 2.0 + change_rad_s,
             change_rad_s,
+            unit_rad_s: change_rad_s,
             variance: 0.001,
         }
     }

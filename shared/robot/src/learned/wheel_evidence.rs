@@ -39,6 +39,10 @@ const TAIL_DRAGGED: f64 = 0.1;
 /// to it. One drags otherwise on another ground; of several together nothing was learned. Chosen:
 /// what the equilibrium leaves out; the rest is learned on the way.
 pub const DRAG_SD: f64 = 0.4;
+/// An offset that is learned on the way is this much smaller where one wheel drags: what it does
+/// was learned. Chosen: as wide as of several, a dead encoder explains a second stuck wheel too
+/// well; none at all, and a second stuck wheel explains a dead encoder.
+const ALONE: f64 = 0.5;
 /// What a wheel that stands askew may change of its own rate, relative to it: with [`DRAG_SD`]
 /// a tenth is one deviation. Chosen: askew by 0.3 rad, rolling alone loses a twentieth.
 const ASKEW: f64 = 0.25;
@@ -75,6 +79,8 @@ pub struct WheelDrag {
     pub rate_rad_s: f64,
     /// What the drag changes of it, rad/s.
     pub change_rad_s: f64,
+    /// What an offset of 1 adds to it, where that is learned on the way.
+    pub unit_rad_s: f64,
     /// Variance about it from one observation to the next, (rad/s)².
     pub variance: f64,
 }
@@ -210,6 +216,10 @@ impl WheelEvidence {
         if mode.moved.stuck() == 0 {
             variance = nominal_variance;
         }
+        let share = match mode.moved.stuck().count_ones() {
+            1 => ALONE,
+            _ => 1.0,
+        };
         // A wheel that stands askew is turned by the ground, too.
         let askew = if mode.moved == Mover::Steer(i) {
             ASKEW * nominal
@@ -219,6 +229,7 @@ impl WheelEvidence {
         WheelDrag {
             rate_rad_s: nominal + shift + change,
             change_rad_s: change + askew,
+            unit_rad_s: share * change + askew,
             variance: variance + behind + uncertain,
         }
     }
