@@ -11,6 +11,7 @@ pub mod chain;
 pub mod corridors;
 pub mod field;
 pub mod ground_change;
+pub mod interval;
 pub mod latency;
 pub mod machine;
 pub mod missions;

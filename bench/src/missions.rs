@@ -39,7 +39,6 @@ pub use report::{compare, document, lines, say, shortfalls};
 pub use rules::{Rule, RuleInput, RuleOutput, Rules};
 pub use score::{MEASURES, Measure, POINTS, Score, measure, price_1_m};
 pub use sweep::mean_points;
-pub use table::Interval;
 
 use std::error::Error;
 use std::path::Path;

@@ -16,7 +16,7 @@ KINDS = {name: value for name, value in vars(vigil).items() if name.startswith("
 
 def verdict(kind=vigil.RECOVERY_GO_ON, **fields):
     """One that lets the robot go on as planned."""
-    plain = dict(speed_scale=1.0, curvature_gain=1.0, valid_for_ns=500_000_000, decision_seq=7, wheel=2**32 - 1)
+    plain = dict(speed_scale=1.0, curvature_gain=1.0, valid_for_ns=500_000_000, decision_seq=7)
     plain |= dict(mode_name=b"ND", runner_up_name=b"LF_STUCK", action_name=b"go_on")
     return vigil.Verdict(**{**plain, "kind": kind, **fields})
 

@@ -9,7 +9,8 @@ use super::exception::Group;
 use super::score::{CALLS, CorridorScore, MEASURES, POINTS, TOUCHES};
 use super::{HELP_S, LIMIT_S};
 use crate::archive::Archive;
-use crate::missions::{Interval, Measure};
+use crate::interval::Interval;
+use crate::missions::Measure;
 use crate::variation::{Commanded, Comparison};
 
 /// Largest probability of Vigil's lead, were there none.

@@ -136,7 +136,9 @@ fn ride(shipped: &ShippedGraph, plan: &Plan, arm: Arm) -> Result<Score, Box<dyn 
     let mut tally = Tally::default();
     let mut frame = SensorFrame::default();
     field.world.measure(&mut frame);
-    for k in 0..(LIMIT_S * rate_hz) as u64 {
+    // Who drives half as fast has twice the time.
+    let limit_s = LIMIT_S / shipped.variation.speed_scale().min(1.0);
+    for k in 0..(limit_s * rate_hz) as u64 {
         frame.header.epoch = 1;
         frame.header.seq = k;
         frame.header.t_capture_ns = (k + 1) * period_ns;

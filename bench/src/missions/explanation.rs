@@ -23,7 +23,8 @@ impl Explanations {
             let wheel = setup.robot.wheel_index(wheel)?;
             let cause = match kind {
                 "stuck" => Cause::Stuck(wheel),
-                _ => Cause::Encoder(wheel),
+                "encoder" => Cause::Encoder(wheel),
+                _ => return None,
             };
             Some((node, cause))
         };
@@ -53,9 +54,10 @@ impl Explanations {
             .leaves
             .iter()
             .filter(|(node, _)| set.leaves >> node & 1 == 1);
-        let several = set.leaves.count_ones() > 1;
-        let order = RuleOutput::limp_home(held.map(|(_, cause)| *cause));
-        order.filter(|_| several)
+        let causes: Vec<Cause> = held.map(|(_, cause)| *cause).collect();
+        let are_all = causes.len() == set.leaves.count_ones() as usize;
+        let is_answered = are_all && causes.len() > 1;
+        RuleOutput::limp_home(causes).filter(|_| is_answered)
     }
 
     /// The most probable explanation, `None` for none, and its probability. Ties go to none, then

@@ -1,6 +1,7 @@
 //! Orders of rules as action blocks, and back.
 
 use vigil_blocks::{Action, RecoveryKind, WHEELS};
+use vigil_robot::counter_steering;
 use vigil_setup::Setup;
 
 use super::rules::RuleOutput;
@@ -26,17 +27,9 @@ pub fn action_block(setup: &Setup, order: RuleOutput) -> Action {
             | RecoveryKind::GoThrough
             | RecoveryKind::MoveAway
     );
-    let (mut gain, mut offset) = (1.0, 0.0);
     let steered = (0..WHEELS).filter(|wheel| steers && wheels.has_stuck(*wheel));
-    for (at, wheel) in steered.enumerate() {
-        let of_wheel = setup.model.compensation(wheel);
-        gain = if at == 0 {
-            of_wheel.0
-        } else {
-            gain + of_wheel.0 - 1.0
-        };
-        offset += of_wheel.1;
-    }
+    let lines = steered.map(|wheel| setup.model.compensation(wheel));
+    let (gain, offset) = counter_steering(lines);
     Action {
         decision_seq: 1,
         kind: kind as u32,

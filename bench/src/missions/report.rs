@@ -6,9 +6,10 @@ use super::commander::Arm;
 use super::drive::Mission;
 use super::kind::Kind;
 use super::score::{CALLS, MEASURES, Measure, POINTS, Score, UNSAFE};
-use super::table::{Interval, ODDS, Table};
+use super::table::{ODDS, Table};
 use super::{HELP_S, LIMIT_S, MissionFile};
 use crate::archive::Archive;
+use crate::interval::Interval;
 use crate::variation::{Commanded, Comparison};
 
 /// Least lower bound of Vigil less a rule, for kinds whose faults are modelled, and for others.

@@ -8,6 +8,7 @@ use super::commander::Arm;
 use super::drive::Mission;
 use super::kind::Kind;
 use super::score::{MEASURES, Measure, Score};
+use crate::interval::Interval;
 
 /// Odds of a fault over those of the file, at which overall figures are given.
 pub(super) const ODDS: [(f64, &str); 3] = [
@@ -15,33 +16,6 @@ pub(super) const ODDS: [(f64, &str); 3] = [
     (3.0, "three times the odds"),
     (1.0 / 3.0, "a third of the odds"),
 ];
-
-/// A mean with the half width of its 95 % interval.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
-    /// Mean.
-    pub mean: f64,
-    /// Half width.
-    pub half_width: f64,
-}
-
-impl Interval {
-    pub(crate) fn lower(self) -> f64 {
-        self.mean - self.half_width
-    }
-
-    pub(crate) fn text(self, decimals: usize, is_difference: bool) -> String {
-        let Self { mean, half_width } = self;
-        match is_difference {
-            true => format!("{mean:+.decimals$} ± {half_width:.decimals$}"),
-            false => format!("{mean:.decimals$} ± {half_width:.decimals$}"),
-        }
-    }
-
-    fn document(self) -> Value {
-        json!({"mean": self.mean, "half_width_95": self.half_width})
-    }
-}
 
 /// What was driven, by whom.
 pub(super) struct Table<'a> {

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::archive::Archive;
-use crate::missions::Interval;
+use crate::interval::Interval;
 
 /// What the missions of one variation brought.
 #[derive(Debug, Clone)]
@@ -51,10 +51,9 @@ impl Comparison {
     pub fn document(&self) -> Value {
         let mut document = json!({"name": self.name});
         for it in &self.commanders {
-            let interval = |of: Interval| json!({"mean": of.mean, "half_width_95": of.half_width});
             document["commanders"][it.name] = json!({
-                "points": interval(it.points),
-                "vigil_minus_this": interval(it.vigil_less),
+                "points": it.points.document(),
+                "vigil_minus_this": it.vigil_less.document(),
                 "calls": it.calls,
                 "harm": it.harm,
             });
@@ -89,7 +88,9 @@ pub fn without_lead(comparisons: &[Comparison]) -> Vec<String> {
     let mut short = Vec::new();
     for comparison in comparisons {
         for it in comparison.others() {
-            if it.vigil_less.lower() <= 0.0 {
+            // One mission has no interval: it shows no lead.
+            let leads = it.vigil_less.lower() > 0.0;
+            if !leads {
                 let (lead, other) = (it.vigil_less.text(1, true), it.name);
                 let name = &comparison.name;
                 short.push(format!("{name}: {lead} against {other}, bar above 0"));

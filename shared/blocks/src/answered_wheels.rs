@@ -1,6 +1,6 @@
 //! The wheels that an action is about.
 
-use crate::WHEELS;
+use crate::sensor::WHEELS;
 
 /// Wheels whose faults an action answers, as bits in the order of the robot's wheels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -167,11 +167,16 @@ impl DecisionProcess {
         if self.control_mode == ControlMode::Safe {
             return self.safe_stop();
         }
-        let action = self.choice.action;
+        let (action, wheels) = (self.choice.action, wheels.about());
+        let kind = match self.kind(action) {
+            // Whoever does not know what is broken cannot drive with it.
+            RecoveryKind::LimpHome if wheels.is_empty() => RecoveryKind::Stop,
+            kind => kind,
+        };
         Instruction {
             action,
-            kind: self.kind(action),
-            wheels: wheels.about(),
+            kind,
+            wheels,
         }
     }
 

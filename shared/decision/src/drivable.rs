@@ -1,8 +1,8 @@
 //! Sets of faults with which a robot can be driven home.
 //!
 //! Counter-steering is learned for one stuck wheel each. Two on different sides pull against each
-//! other, and what is steered against each adds up. Two on one side turn the robot about them:
-//! nothing steers against that.
+//! other: what is steered against each adds up, nearly. Two on one side turn the robot about them:
+//! nothing steers against that. A wheel that is on no side counts as one on the right.
 
 use vigil_blocks::AnsweredWheels;
 use vigil_robot::Description;

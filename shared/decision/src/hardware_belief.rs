@@ -45,11 +45,15 @@ impl HardwareBelief {
     }
 
     /// Takes a sound diagnosis; `belief` is the predicted one over the model's states.
-    pub(crate) fn take(&mut self, diagnosis: &FaultBelief, situation: Situation, belief: &[f64]) {
+    pub(crate) fn take(
+        &mut self,
+        diagnosis: &FaultBelief,
+        drivable: &DrivableSets,
+        situation: Situation,
+        belief: &[f64],
+    ) {
         self.take_by(situation.rests, belief, |states, predicted, p| {
-            // A model of navigation and hardware together has no action that limps home.
-            let none = DrivableSets::none();
-            write_weights(diagnosis, states, &none, situation.alarm, predicted, p);
+            write_weights(diagnosis, states, drivable, situation.alarm, predicted, p);
             normalise(p);
         });
     }

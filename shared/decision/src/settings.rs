@@ -146,8 +146,8 @@ pub struct RecoveryAction {
     /// Kind of the recovery.
     pub kind: Recovery,
     /// Factor on the commanded speed. Unless given: 0.5 for `slow_down`, 0.7 for `compensate` and
-    /// `limp_home`, 0 for what is done standing (`stop`, `call_for_help`, `new_path`, `relocalise`, `give_up`,
-    /// `own`), else 1.
+    /// `limp_home`, 0 for what is done standing (`stop`, `call_for_help`, `new_path`,
+    /// `relocalise`, `give_up`, `own`), else 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub speed_scale: Option<f64>,
     /// Whether the robot reports that it is done. Unless given: not for what goes on (`go_on`,

@@ -2,9 +2,9 @@
 //!
 //! States exclude each other, faults do not: a set of several faults counts once. It belongs to
 //! SEVERAL_DRIVABLE if a robot can be driven home with it, and to SEVERAL if not, or if the model
-//! does not tell them apart. In a model without these states it belongs to the one that holds all of
-//! its leaves; else to UNKNOWN. What the sets that are reported leave of a leaf's probability counts
-//! for the leaf.
+//! does not tell them apart. In a model without these states it belongs to the one that holds all
+//! of its leaves; else to UNKNOWN. What the sets that are reported leave of a leaf's probability
+//! counts for the leaf.
 //!
 //! States that stand for the same (UNKNOWN and UNKNOWN_OLD) share its probability as the predicted
 //! belief does: the identifier says nothing of a fault's age, the decision model's transitions do.

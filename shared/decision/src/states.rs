@@ -88,7 +88,7 @@ pub(crate) fn leaves(tree: &FaultTree, robot: &Description) -> Vec<Leaf> {
 /// True if a state may have this name because of what it says about the hardware.
 pub(crate) fn is_of_hardware(name: &str, tree: &FaultTree) -> bool {
     let names = |leaf| tree.state_names(leaf).any(|of_leaf| of_leaf == name);
-    matches!(name, UNKNOWN | UNKNOWN_OLD | FAULT | SEVERAL)
+    matches!(name, UNKNOWN | UNKNOWN_OLD | FAULT | SEVERAL | DRIVABLE)
         || tree
             .nodes()
             .first()

@@ -81,7 +81,8 @@ impl SymptomDecision {
         let Some(hardware) = &mut self.hardware else {
             return;
         };
-        hardware.take(diagnosis, situation, self.process.tracker.belief());
+        let (drivable, belief) = (self.wheels.drivable(), self.process.tracker.belief());
+        hardware.take(diagnosis, drivable, situation, belief);
         let wheels_moved = self.wheels.have_moved(diagnosis);
         if wheels_moved {
             self.wheels.take(diagnosis);

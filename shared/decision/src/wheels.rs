@@ -3,7 +3,7 @@
 use vigil_blocks::RecoveryKind;
 use vigil_blocks::{Action, AnsweredWheels, FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet};
 use vigil_pomdp::Pomdp;
-use vigil_robot::{Description, FaultTree};
+use vigil_robot::{Description, FaultTree, counter_steering};
 
 use crate::drivable::DrivableSets;
 use crate::error::SupervisorError;
@@ -12,6 +12,9 @@ use crate::states::{self, Leaf, LeafKind};
 
 /// A fault is named above this probability: more likely than not.
 const NAMED: f64 = 0.5;
+/// A set that is this many times as probable as the one that is answered is answered instead,
+/// though neither is more likely than not. Chosen by hand.
+const FAR_MORE: f64 = 2.0;
 /// A probability that has moved by more than this opens another decision. Chosen by hand, as for
 /// the belief over states.
 const MOVED: f64 = 0.05;
@@ -96,10 +99,15 @@ impl Wheels {
                 .filter(|(_, p)| *p > NAMED),
             _ => None,
         };
-        // Other wheels than those of the action that goes on have to be more likely than not.
+        // Other wheels than those of the action that goes on have to be more likely than not, or
+        // far more likely than these.
         let held = self.about;
         let is_held = goes_on && !held.is_empty();
-        let other = about.filter(|(_, p)| !is_held || *p > NAMED);
+        let p_held = match kind {
+            RecoveryKind::LimpHome => self.p_of_set(held),
+            _ => NAMED,
+        };
+        let other = about.filter(|(_, p)| !is_held || *p > NAMED || *p > FAR_MORE * p_held);
         self.about = match other {
             Some((wheels, _)) => wheels,
             None if is_held => held,
@@ -113,7 +121,7 @@ impl Wheels {
     }
 
     /// Writes how the stuck wheels of an action of `kind` are steered against. The robot then
-    /// drives the curvature κ, commanded `gain·κ + offset`; what several wheels need adds up.
+    /// nearly drives the curvature κ, commanded `gain·κ + offset`.
     pub(crate) fn write(&self, kind: RecoveryKind, action: &mut Action) {
         let steers = matches!(
             kind,
@@ -123,15 +131,9 @@ impl Wheels {
             return;
         }
         let is_about = |it: &&Compensation| self.about.has_stuck(it.wheel);
-        let mut count = 0;
-        for counter in self.compensation.iter().filter(is_about) {
-            action.curvature_gain = match count {
-                0 => counter.curvature_gain,
-                _ => action.curvature_gain + counter.curvature_gain - 1.0,
-            };
-            action.curvature_offset += counter.curvature_offset_1_m;
-            count += 1;
-        }
+        let lines = self.compensation.iter().filter(is_about);
+        let lines = lines.map(|it| (it.curvature_gain, it.curvature_offset_1_m));
+        (action.curvature_gain, action.curvature_offset) = counter_steering(lines);
     }
 
     /// The wheel with such a fault, and its probability.
@@ -148,11 +150,21 @@ impl Wheels {
         first_largest(found)
     }
 
-    /// The wheels of the set that can be driven home with, and its probability.
+    /// The wheels of the most probable set that can be driven home with, and its probability.
     fn most_probable_set(&self) -> Option<(AnsweredWheels, f64)> {
-        let sets = self.sets.iter();
-        let drivable = sets.filter(|set| self.drivable.holds(set.leaves));
-        first_largest(drivable.map(|set| (self.drivable.answered(set.leaves), set.p)))
+        first_largest(self.drivable_sets())
+    }
+
+    /// Probability of the set with these wheels; 0 if it is not among the most probable.
+    fn p_of_set(&self, wheels: AnsweredWheels) -> f64 {
+        let found = self.drivable_sets().find(|(of, _)| *of == wheels);
+        found.map_or(0.0, |(_, p)| p)
+    }
+
+    fn drivable_sets(&self) -> impl Iterator<Item = (AnsweredWheels, f64)> {
+        let drivable = |set: &&FaultSet| self.drivable.holds(set.leaves);
+        let sets = self.sets.iter().filter(drivable);
+        sets.map(|set| (self.drivable.answered(set.leaves), set.p))
     }
 }
 

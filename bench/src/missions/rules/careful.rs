@@ -6,8 +6,8 @@
 //!    against a stuck wheel, ignore a broken encoder, go on if nothing is wrong; else creep.
 //! 4. If another explanation is the most probable for a while, begin again at 2; after so many
 //!    looks, or so much creeping without an explanation, call for help and wait.
-//! 5. As soon as there are several faults, answer all of them or call for help, if it is told to:
-//!    else it answers one.
+//! 5. As soon as there are several faults, answer all of them or call for help, if it is set to.
+//!    Else it answers one.
 //! 6. If the alarm has gone and nothing is wrong for a while, drive as planned.
 
 use serde::{Deserialize, Serialize};

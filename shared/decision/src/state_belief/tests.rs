@@ -71,7 +71,7 @@ fn a_set_of_several_faults_is_several_or_else_what_holds_it_or_unknown() {
         &weighed(&states, said, &sets),
         &[0.5, 0.125, 0.25, 0.0, 0.125],
     );
-    // Both may be of one state: no action compensates two wheels.
+    // Both may be of one state: what answers one does not answer both.
     let states = [NOMINAL, state(Subject::Fault, 0b11110), SEVERAL, UNKNOWN];
     near(&weighed(&states, said, &sets), &[0.125, 0.25, 0.5, 0.125]);
     let states = [NOMINAL, state(Subject::Fault, 0b11110), UNKNOWN];

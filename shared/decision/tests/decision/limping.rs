@@ -91,10 +91,13 @@ fn a_rover_limps_home_with_all_that_is_broken_answered() {
     assert_eq!(rover.action.answered(), both);
     rover.demand_counter(&[0]);
     assert!(rover.action.speed_scale < 1.0);
-    // Another set is answered once it is more likely than not; a change of it is a decision.
+    // Another set is answered once it is more likely than not, or twice as likely as the one that
+    // is answered; a change of it is a decision.
     let asked = rover.action.decision_seq;
     let other: &[&str] = &["LF_STUCK", "RR_STUCK"];
-    rover.believe(&[(&["LF_STUCK", "RM_ENC"], 0.52), (other, 0.48)]);
+    let third: &[&str] = &["LF_ENC", "RM_ENC"];
+    let held: &[&str] = &["LF_STUCK", "RM_ENC"];
+    rover.believe(&[(other, 0.45), (held, 0.4), (third, 0.15)]);
     assert_eq!(
         (rover.action.answered(), rover.action.decision_seq),
         (both, asked)
@@ -106,6 +109,10 @@ fn a_rover_limps_home_with_all_that_is_broken_answered() {
         (stuck, asked + 1)
     );
     rover.demand_counter(&[0, 5]);
+    rover.believe(&[(third, 0.4), (held, 0.35), (other, 0.15)]);
+    let encoders = AnsweredWheels::one_encoder(0).with(AnsweredWheels::one_encoder(4));
+    assert_eq!(rover.action.answered(), encoders);
+    rover.demand_counter(&[]);
     // Mended again.
     assert_eq!(
         rover.believe(&[(&["RR_STUCK"], 1.0)]),

@@ -249,7 +249,7 @@ impl ChannelEvidence {
                     let healthy = evidence.healthy[wheel];
                     let ratio = evidence.any[wheel] - healthy;
                     healthy + lineage.anything[wheel].step([0.0, ratio], [CHANGES; 2])
-                } else if mode.turns_anyhow(wheel) && !is_new {
+                } else if mode.learns_rate(wheel) && !is_new {
                     let dragged = evidence.dragged(&self.model, observation, mode, wheel);
                     let (model, offsets) = (&self.model, &mut lineage.offsets);
                     let log_likelihood =

@@ -2,8 +2,8 @@
 //!
 //! One drags otherwise on another ground, and of several together nothing was learned: the expected
 //! rates are wrong by more than noise, and always alike. Taken as noise it would count again in
-//! every observation. A true pair would lose to a dead encoder with time; and one stuck wheel beside
-//! a dead encoder would lose to a pair that learns.
+//! every observation. A true pair would lose to a dead encoder with time; and one stuck wheel
+//! beside a dead encoder would lose to a pair that learns.
 
 use vigil_blocks::WHEELS;
 use vigil_robot::learned::wheel_context::FAR_SD;
@@ -14,8 +14,8 @@ use vigil_robot::learned::{Model, Observation, WheelEvidence};
 /// reaches [`DRAG_SD`] in 1600 of them, 80 s: a tolerance's length, 8 m, at 0.1 m/s.
 const DRIFT_SD: f64 = 0.01;
 
-/// Gaussian beliefs about the offsets in units of [`WheelDrag::unit_rad_s`], one per wheel: a scalar
-/// Kalman filter each. Relative, as the change follows the command.
+/// Gaussian beliefs about the offsets in units of [`WheelDrag::unit_rad_s`], one per wheel: a
+/// scalar Kalman filter each. Relative, as the change follows the command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RateOffsets {
     mean: [f64; WHEELS],

@@ -17,7 +17,7 @@ use crate::identify::sizes::EncoderSizes;
 pub struct WheelTerms {
     /// In general, and at the mode's onset.
     likelihoods: [Likelihoods; 2],
-    /// Wheels that turn in a way of which nothing was learned, and how they may.
+    /// Wheels whose rates are learned on the way, and how they are expected to turn.
     dragged: [Option<WheelDrag>; WHEELS],
     stuck: u32,
 }
@@ -45,7 +45,7 @@ impl WheelUpdate<'_> {
             likelihoods: [false, true].map(|is_new| self.likelihoods(mode, is_new, sized)),
             dragged: std::array::from_fn(|wheel| {
                 let is_wheel = wheel < self.robot.wheels.len();
-                (is_wheel && mode.turns_anyhow(wheel)).then(|| {
+                (is_wheel && mode.learns_rate(wheel)).then(|| {
                     let (model, observation) = (self.model, self.observation);
                     self.evidence.dragged(model, observation, mode, wheel)
                 })

@@ -162,7 +162,7 @@ impl MotionMode {
 
     /// True if this wheel's rate is learned on the way: others drag, or it stands askew.
     #[must_use]
-    pub fn turns_anyhow(&self, wheel: usize) -> bool {
+    pub fn learns_rate(&self, wheel: usize) -> bool {
         match self.moved {
             Mover::Stuck(_) => !self.moved.is_stuck(wheel),
             Mover::Steer(askew) => askew == wheel,

@@ -87,7 +87,7 @@ pub struct WheelDrag {
 
 impl WheelDrag {
     /// Variance of the rate where nothing of the change was learned on the way, (rad/s)².
-    fn variance_anywhere(&self) -> f64 {
+    fn variance_unlearned(&self) -> f64 {
         let sd = DRAG_SD * self.change_rad_s;
         self.variance + sd * sd
     }
@@ -175,7 +175,7 @@ impl WheelEvidence {
             moved if moved.is_stuck(i) => self.standing(i),
             Mover::Stuck(_) => {
                 let dragged = self.dragged(model, observation, mode, i);
-                let variance = dragged.variance_anywhere();
+                let variance = dragged.variance_unlearned();
                 let dragged = self.turning(model, observation, i, dragged.rate_rad_s, variance);
                 either(dragged, self.healthy[i])
             }
@@ -249,7 +249,7 @@ impl WheelEvidence {
         (reading.plain > 0).then(|| RateResidual {
             residual_rad_s: reading.mean - (dragged.rate_rad_s - shift),
             rolling_rad_s: self.rolling[i].0,
-            variance: dragged.variance_anywhere() - uncertain
+            variance: dragged.variance_unlearned() - uncertain
                 + self.sample_variance(i, reading.plain),
         })
     }
@@ -274,7 +274,7 @@ impl WheelEvidence {
         let dragged = self.dragged(model, observation, mode, i);
         ExpectedRate {
             mean_rad_s: dragged.rate_rad_s,
-            variance: dragged.variance_anywhere(),
+            variance: dragged.variance_unlearned(),
             tail: TAIL_DRAGGED,
         }
     }

@@ -85,8 +85,7 @@ pub struct Verdict {
     pub is_identifying: bool,
     /// Mode with hysteresis, named as `mode` is.
     pub reported: String,
-    /// The action, and the wheel that it is about after a colon; empty if nothing is
-    /// decided.
+    /// The action, and the wheels that it is about after a colon; empty if nothing is decided.
     pub action: String,
     /// What the action orders the robot to do, as far as it is scored.
     pub order: field::RobotOrder,

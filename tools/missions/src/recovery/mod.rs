@@ -1,9 +1,10 @@
 //! The model of what to do about faults, from a few parameters.
 //!
 //! States are nominal (`ND`), a leaf of the fault tree or leaves about which the same is done
-//! (`STUCK`, `FAULT`), two faults or more (`SEVERAL`), what nothing explains, new and old
-//! (`UNKNOWN`, `UNKNOWN_OLD`), and the end of the task (`DONE`). Rewards are what a healthy robot
-//! would not have paid, so that a robot with nothing wrong loses only time.
+//! (`STUCK`, `FAULT`), two faults or more (`SEVERAL`, and apart from these `SEVERAL_DRIVABLE`),
+//! what nothing explains, new and old (`UNKNOWN`, `UNKNOWN_OLD`), and the end of the task (`DONE`).
+//! Rewards are what a healthy robot would not have paid, so that a robot with nothing wrong loses
+//! only time.
 //!
 //! - The task ends with the way: a robot that stands comes no nearer to its end. So the discount
 //!   need not stand for it, and may be near 1.
