@@ -4,35 +4,24 @@
 //! other: what is steered against each adds up, nearly. Two on one side turn the robot about them:
 //! nothing steers against that. A wheel that is on no side counts as one on the right.
 
-use vigil_blocks::AnsweredWheels;
 use vigil_robot::Description;
 
 use crate::mapping::Compensation;
 use crate::states::{Leaf, LeafKind};
 
 /// Which sets of leaves an action that limps home can answer.
-#[derive(Debug, Clone, PartialEq)]
+/// None by default.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct DrivableSets {
-    /// Leaves that can be answered.
-    leaves: Vec<Leaf>,
-    /// Those of encoders, and those of stuck wheels on the right and on the left, as bits.
+    /// Leaves of encoders, and of stuck wheels on the right and on the left, as bits.
     encoders: u64,
     stuck: [u64; 2],
 }
 
 impl DrivableSets {
-    /// None: no set can be answered as one.
-    pub(crate) const fn none() -> Self {
-        Self {
-            leaves: Vec::new(),
-            encoders: 0,
-            stuck: [0; 2],
-        }
-    }
-
     /// Those of a robot's leaves that can be steered against or ignored.
     pub(crate) fn new(leaves: &[Leaf], robot: &Description, compensation: &[Compensation]) -> Self {
-        let mut sets = Self::none();
+        let mut sets = Self::default();
         for leaf in leaves {
             let Some(wheel) = leaf.wheel else {
                 continue;
@@ -44,9 +33,8 @@ impl DrivableSets {
                     let is_left = robot.wheels.get(wheel).is_some_and(|it| it.y > 0.0);
                     sets.stuck[usize::from(is_left)] |= bit;
                 }
-                LeafKind::Stuck | LeafKind::Other => continue,
+                LeafKind::Stuck | LeafKind::Other => {}
             }
-            sets.leaves.push(*leaf);
         }
         sets
     }
@@ -57,17 +45,5 @@ impl DrivableSets {
         set.count_ones() > 1
             && set & !(self.encoders | right | left) == 0
             && self.stuck.iter().all(|side| (set & side).count_ones() <= 1)
-    }
-
-    /// What is to be answered of a set.
-    pub(crate) fn answered(&self, set: u64) -> AnsweredWheels {
-        let of_leaf = |leaf: &Leaf| match (leaf.wheel, leaf.kind) {
-            (Some(wheel), LeafKind::Stuck) => AnsweredWheels::one_stuck(wheel),
-            (Some(wheel), LeafKind::Encoder) => AnsweredWheels::one_encoder(wheel),
-            _ => AnsweredWheels::default(),
-        };
-        let held = self.leaves.iter().filter(|leaf| set >> leaf.node & 1 == 1);
-        held.map(of_leaf)
-            .fold(AnsweredWheels::default(), AnsweredWheels::with)
     }
 }

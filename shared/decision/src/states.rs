@@ -2,6 +2,7 @@
 //!
 //! Which state a leaf belongs to says [`FaultTree::state_names`].
 
+use vigil_blocks::AnsweredWheels;
 use vigil_robot::{Description, FaultTree};
 
 use crate::error::SupervisorError;
@@ -65,6 +66,17 @@ pub(crate) struct Leaf {
     pub kind: LeafKind,
     /// Its wheel.
     pub wheel: Option<usize>,
+}
+
+impl Leaf {
+    /// What an action is about that answers it.
+    pub(crate) fn answered(&self) -> AnsweredWheels {
+        match (self.wheel, self.kind) {
+            (Some(wheel), LeafKind::Stuck) => AnsweredWheels::one_stuck(wheel),
+            (Some(wheel), LeafKind::Encoder) => AnsweredWheels::one_encoder(wheel),
+            _ => AnsweredWheels::default(),
+        }
+    }
 }
 
 /// The leaves of a tree, in order.

@@ -139,15 +139,9 @@ impl Wheels {
     /// The wheel with such a fault, and its probability.
     fn most_probable(&self, kind: LeafKind) -> Option<(AnsweredWheels, f64)> {
         let of_kind = self.leaves.iter().filter(|leaf| leaf.kind == kind);
-        let found = of_kind.filter_map(|leaf| {
-            let p = self.p.get(leaf.node).copied().unwrap_or(0.0);
-            let wheels = match kind {
-                LeafKind::Encoder => AnsweredWheels::one_encoder(leaf.wheel?),
-                _ => AnsweredWheels::one_stuck(leaf.wheel?),
-            };
-            Some((wheels, p))
-        });
-        first_largest(found)
+        let with_wheel = of_kind.filter(|leaf| leaf.wheel.is_some());
+        let p = |leaf: &Leaf| self.p.get(leaf.node).copied().unwrap_or(0.0);
+        first_largest(with_wheel.map(|leaf| (leaf.answered(), p(leaf))))
     }
 
     /// The wheels of the most probable set that can be driven home with, and its probability.
@@ -161,10 +155,17 @@ impl Wheels {
         found.map_or(0.0, |(_, p)| p)
     }
 
+    /// What an action is about that answers all leaves of a set.
+    fn answered(&self, set: u64) -> AnsweredWheels {
+        let held = self.leaves.iter().filter(|leaf| set >> leaf.node & 1 == 1);
+        held.map(Leaf::answered)
+            .fold(AnsweredWheels::default(), AnsweredWheels::with)
+    }
+
     fn drivable_sets(&self) -> impl Iterator<Item = (AnsweredWheels, f64)> {
         let drivable = |set: &&FaultSet| self.drivable.holds(set.leaves);
         let sets = self.sets.iter().filter(drivable);
-        sets.map(|set| (self.drivable.answered(set.leaves), set.p))
+        sets.map(|set| (self.answered(set.leaves), set.p))
     }
 }
 

@@ -33,7 +33,7 @@ fn weighed<const N: usize>(
         (set.leaves, set.p) = (*leaves, *p);
     }
     let mut out = [0.0; N];
-    let drivable = DrivableSets::none();
+    let drivable = DrivableSets::default();
     write_weights(&said, states, &drivable, true, &[0.0; N], &mut out);
     out
 }
@@ -89,7 +89,7 @@ fn before_an_alarm_the_unknown_is_nominal() {
         write_weights(
             &said,
             &STATES,
-            &DrivableSets::none(),
+            &DrivableSets::default(),
             alarm,
             &[0.25; 4],
             &mut found,
@@ -101,7 +101,7 @@ fn before_an_alarm_the_unknown_is_nominal() {
     write_weights(
         &diagnosis(&[0.9], 0.9),
         &STATES,
-        &DrivableSets::none(),
+        &DrivableSets::default(),
         false,
         &[0.25; 4],
         &mut found,
@@ -123,7 +123,7 @@ fn states_of_the_unknown_share_it_as_predicted_and_the_end_is_never_believed() {
         write_weights(
             &said,
             &states,
-            &DrivableSets::none(),
+            &DrivableSets::default(),
             true,
             &predicted,
             &mut found,

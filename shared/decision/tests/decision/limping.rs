@@ -1,11 +1,11 @@
 //! Several faults at once, by the rover's shipped model and policy.
 
-use vigil_blocks::{Action, AnsweredWheels, DetectionBelief, Entry, FaultBelief, RecoveryKind};
+use vigil_blocks::{Action, AnsweredWheels, DetectionBelief, Entry, RecoveryKind};
 use vigil_decision::{Inputs, Supervisor};
 use vigil_setup::{Setup, load_graph};
 use vigil_supervisor::assemble;
 
-use crate::world::{CYCLE_NS, config};
+use crate::world::{CYCLE_NS, config, of_sets};
 
 /// The shipped supervisor, and what the identifier holds.
 struct Rover {
@@ -28,21 +28,7 @@ impl Rover {
 
     /// Twenty cycles in which these sets of leaves have these probabilities, and nothing else any.
     fn believe(&mut self, sets: &[(&[&str], f64)]) -> RecoveryKind {
-        let mut diagnosis = FaultBelief {
-            tree_hash: self.setup.tree.hash(),
-            identifying: 1,
-            set_count: sets.len() as u32,
-            ..FaultBelief::default()
-        };
-        for (set, (leaves, p)) in diagnosis.sets.iter_mut().zip(sets) {
-            set.p = *p;
-            for leaf in *leaves {
-                let node = self.setup.tree.index(leaf).unwrap();
-                set.leaves |= 1 << node;
-                diagnosis.p[node] += p;
-            }
-        }
-        diagnosis.p_predicted = diagnosis.p;
+        let mut diagnosis = of_sets(&self.setup.tree, sets);
         for _ in 0..20 {
             self.t_ns += CYCLE_NS;
             diagnosis.header.t_capture_ns = self.t_ns;

@@ -29,6 +29,26 @@ pub fn settings() -> vigil_decision::Settings {
     toml::from_str(include_str!("by_hand.toml")).unwrap()
 }
 
+/// A diagnosis of these exact sets of faults, and of nothing else.
+pub fn of_sets(tree: &FaultTree, sets: &[(&[&str], f64)]) -> FaultBelief {
+    let mut belief = FaultBelief {
+        identifying: 1,
+        tree_hash: tree.hash(),
+        set_count: sets.len() as u32,
+        ..Default::default()
+    };
+    for (set, (leaves, p)) in belief.sets.iter_mut().zip(sets) {
+        set.p = *p;
+        for leaf in *leaves {
+            let node = tree.index(leaf).unwrap();
+            set.leaves |= 1 << node;
+            belief.p[node] += p;
+        }
+    }
+    belief.p_predicted = belief.p;
+    belief
+}
+
 /// A supervisor and what it takes.
 pub struct World {
     pub supervisor: Supervisor,
@@ -109,22 +129,8 @@ impl World {
     /// A diagnosis of these exact sets of faults, and of nothing else.
     pub fn of_sets(&mut self, sets: &[(&[&str], f64)]) -> FaultBelief {
         self.t_ns += CYCLE_NS;
-        let mut belief = FaultBelief {
-            identifying: 1,
-            tree_hash: self.tree.hash(),
-            set_count: sets.len() as u32,
-            ..Default::default()
-        };
+        let mut belief = of_sets(&self.tree, sets);
         belief.header.t_capture_ns = self.t_ns;
-        for (set, (leaves, p)) in belief.sets.iter_mut().zip(sets) {
-            set.p = *p;
-            for leaf in *leaves {
-                let node = self.tree.index(leaf).unwrap();
-                set.leaves |= 1 << node;
-                belief.p[node] += p;
-            }
-        }
-        belief.p_predicted = belief.p;
         belief
     }
 
