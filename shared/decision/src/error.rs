@@ -28,7 +28,8 @@ pub enum SupervisorError {
     #[error(
         "state '{0}' of the decision model stands for no leaf of the fault tree that has no other \
          state; it may be a leaf, an inner node, a kind of faults in capitals (STUCK for \
-         'stuck:LF'), ND, FAULT, SEVERAL, SEVERAL_DRIVABLE, UNKNOWN, UNKNOWN_OLD or DONE"
+         'stuck:LF'), ND, FAULT, SEVERAL, SEVERAL_DRIVABLE or UNKNOWN, each \
+         also with _NEW at its end, or DONE"
     )]
     NoLeaf(String),
     /// An action of the model is not mapped.

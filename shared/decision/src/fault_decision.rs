@@ -12,6 +12,7 @@ use crate::inputs::Inputs;
 use crate::latch::{Latch, stands};
 use crate::mapping::Compensation;
 use crate::settings::Settings;
+use crate::settling::{Settling, settled};
 use crate::state_belief::{self, MOVED, distance, normalise, write_fallback, write_weights};
 use crate::states::{self, StateMeaning, Subject};
 use crate::switching_cost::SwitchingCost;
@@ -39,12 +40,13 @@ impl EpochClock {
     }
 }
 
-/// Takes over the identifier's belief, tracks how old the unknown is, and chooses actions.
+/// Takes over the identifier's belief, tracks whether evidence still comes, and chooses actions.
 pub(crate) struct FaultDecision {
     process: DecisionProcess,
     tree_hash: u64,
     states: Vec<StateMeaning>,
     wheels: Wheels,
+    settling: Settling,
     epoch_clock: EpochClock,
     decision_t_capture_ns: Option<u64>,
     latch: Latch,
@@ -70,6 +72,7 @@ impl FaultDecision {
             tree_hash: tree.hash(),
             states,
             wheels,
+            settling: Settling::SETTLED,
             epoch_clock: EpochClock {
                 epoch_ns: (settings.epoch_ms * 1e6) as u64,
                 t_capture_ns: None,
@@ -92,6 +95,7 @@ impl FaultDecision {
         }
         self.process.tracker.anchor(&self.process.scratch);
         self.wheels.forget();
+        self.settling = Settling::SETTLED;
         self.decision_t_capture_ns = None;
         self.switching.forget();
         let best = self.process.decider.decide(self.process.tracker.belief());
@@ -105,12 +109,17 @@ impl FaultDecision {
         let process = &mut self.process;
         let before = process.tracker.belief();
         let weights = &mut process.scratch;
-        let drivable = self.wheels.drivable();
-        write_weights(diagnosis, &self.states, drivable, alarm, before, weights);
+        let answerable = self.wheels.answerable();
+        write_weights(diagnosis, &self.states, answerable, alarm, weights);
         normalise(weights);
+        let expected = settled(&self.states, before);
+        let mut settling = self.settling;
         if timed {
-            process.log_evidence = log_score(before, weights);
+            process.log_evidence = log_score(&expected, weights);
+            settling.pass(&self.states, before);
         }
+        settling.take(&self.states, &expected, weights);
+        settling.write(&self.states, weights);
         let is_due = timed
             || process.control_mode != ControlMode::Policy
             || distance(before, weights) > MOVED
@@ -121,6 +130,7 @@ impl FaultDecision {
         let process = &mut self.process;
         process.control_mode = ControlMode::Policy;
         process.tracker.anchor(&process.scratch);
+        self.settling = settling;
         self.wheels.take(diagnosis);
         self.decide(t_capture_ns);
     }

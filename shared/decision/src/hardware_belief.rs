@@ -5,7 +5,7 @@ use vigil_pomdp::Pomdp;
 use vigil_robot::FaultTree;
 
 use crate::alarm_fusion::Situation;
-use crate::drivable::DrivableSets;
+use crate::answerable::AnswerableFaults;
 use crate::error::SupervisorError;
 use crate::joint_states::JointStates;
 use crate::state_belief::{self, normalise, write_fallback, write_weights};
@@ -48,12 +48,12 @@ impl HardwareBelief {
     pub(crate) fn take(
         &mut self,
         diagnosis: &FaultBelief,
-        drivable: &DrivableSets,
+        answerable: &AnswerableFaults,
         situation: Situation,
         belief: &[f64],
     ) {
-        self.take_by(situation.rests, belief, |states, predicted, p| {
-            write_weights(diagnosis, states, drivable, situation.alarm, predicted, p);
+        self.take_by(situation.rests, belief, |states, _, p| {
+            write_weights(diagnosis, states, answerable, situation.alarm, p);
             normalise(p);
         });
     }

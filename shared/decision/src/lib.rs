@@ -1,9 +1,9 @@
 #![doc = include_str!("../README.md")]
 
 mod alarm_fusion;
+mod answerable;
 mod decision_process;
 mod despot_settings;
-mod drivable;
 mod epoch;
 mod error;
 mod fault_decision;
@@ -15,6 +15,7 @@ mod mapping;
 mod observations;
 mod policy;
 mod settings;
+mod settling;
 mod stage_loss;
 mod state_belief;
 mod states;

@@ -6,14 +6,16 @@
 //! of its leaves; else to UNKNOWN. What the sets that are reported leave of a leaf's probability
 //! counts for the leaf.
 //!
-//! States that stand for the same (UNKNOWN and UNKNOWN_OLD) share its probability as the predicted
-//! belief does: the identifier says nothing of a fault's age, the decision model's transitions do.
+//! An action that is about one wheel answers the most probable one. That it is another of the same
+//! state counts as unknown.
+//!
+//! The identifier does not say whether evidence still comes: what it says is of settled states.
 //! What has no name is nothing before the fused alarm: the odds of a departure wander on a healthy
 //! robot too, and the alarm alone is calibrated.
 
 use vigil_blocks::{DetectionBelief, FaultBelief, FaultSet};
 
-use crate::drivable::DrivableSets;
+use crate::answerable::AnswerableFaults;
 use crate::states::{StateMeaning, Subject};
 
 /// A probability may exceed 1 by this much, for rounding. Chosen: far beyond what sums round to.
@@ -28,14 +30,12 @@ pub(crate) const MOVED: f64 = 0.05;
 /// A diagnosis says at least this much in all; a sound one sums to 1 or more.
 const P_SUM_MIN: f64 = 0.5;
 
-/// Writes the identifier's belief over the states into `weights`, which need not sum to 1;
-/// `predicted` is the decision model's own belief.
+/// Writes the identifier's belief over the states into `weights`, which need not sum to 1.
 pub(crate) fn write_weights(
     diagnosis: &FaultBelief,
     states: &[StateMeaning],
-    drivable: &DrivableSets,
+    answerable: &AnswerableFaults,
     alarm: bool,
-    predicted: &[f64],
     weights: &mut [f64],
 ) {
     for (weight, meaning) in weights.iter_mut().zip(states) {
@@ -44,10 +44,14 @@ pub(crate) fn write_weights(
     let several = position(states, Subject::Several);
     let driven = position(states, Subject::Drivable);
     for set in sets_of_several(diagnosis) {
-        let driven = driven.filter(|_| drivable.holds(set.leaves));
+        let driven = driven.filter(|_| answerable.are_drivable(set.leaves));
         divide(set, states, driven.or(several), weights);
     }
-    share_unknown(states, predicted, weights);
+    let unsure = leave_answered(diagnosis, states, answerable, weights);
+    let unknown = position(states, Subject::Unknown);
+    if let Some(weight) = unknown.and_then(|unknown| weights.get_mut(unknown)) {
+        *weight += unsure;
+    }
 }
 
 /// The same without an identifier: the detector says how probable a fault is, the belief before
@@ -94,25 +98,27 @@ pub(crate) fn distance(one: &[f64], other: &[f64]) -> f64 {
 }
 
 fn position(states: &[StateMeaning], subject: Subject) -> Option<usize> {
-    states.iter().position(|meaning| meaning.subject == subject)
+    let is_it = |meaning: &StateMeaning| meaning.subject == subject && meaning.settled.is_none();
+    states.iter().position(is_it)
 }
 
 /// Probability of a state; without an alarm, the unknown is nominal. Those of leaves add up, to
 /// more than 1 where they may be present together.
 fn probability(diagnosis: &FaultBelief, meaning: StateMeaning, alarm: bool) -> f64 {
     match meaning.subject {
+        _ if meaning.settled.is_some() => 0.0,
         Subject::Unknown if alarm => diagnosis.p_unknown,
         Subject::Nominal if !alarm => (diagnosis.p[0] + diagnosis.p_unknown).min(1.0),
         Subject::Nominal => diagnosis.p[0],
-        Subject::Fault => leaves(diagnosis, meaning).sum(),
+        Subject::Fault => leaves(diagnosis, meaning).map(|(_, p)| p).sum(),
         Subject::Unknown | Subject::Several | Subject::Drivable | Subject::Done => 0.0,
     }
 }
 
-fn leaves(diagnosis: &FaultBelief, meaning: StateMeaning) -> impl Iterator<Item = f64> {
-    let is_held = move |(leaf, _): &(usize, &f64)| meaning.leaves >> leaf & 1 == 1;
-    let found = diagnosis.p.iter().enumerate().filter(is_held);
-    found.map(|(_, p)| *p)
+/// A state's leaves, and their probabilities.
+fn leaves(diagnosis: &FaultBelief, meaning: StateMeaning) -> impl Iterator<Item = (usize, f64)> {
+    let all = diagnosis.p.iter().copied().enumerate();
+    all.filter(move |(leaf, _)| meaning.leaves >> leaf & 1 == 1)
 }
 
 /// Takes the probability of a set of several faults from its leaves, and gives it to the one state
@@ -122,7 +128,8 @@ fn divide(set: &FaultSet, states: &[StateMeaning], several: Option<usize>, weigh
         let own = f64::from((set.leaves & meaning.leaves).count_ones());
         *weight = (*weight - own * set.p).max(0.0);
     }
-    let holds = |meaning: &StateMeaning| set.leaves & !meaning.leaves == 0;
+    let holds =
+        |meaning: &StateMeaning| meaning.settled.is_none() && set.leaves & !meaning.leaves == 0;
     let state = several
         .or_else(|| states.iter().position(holds))
         .or_else(|| position(states, Subject::Unknown));
@@ -131,25 +138,34 @@ fn divide(set: &FaultSet, states: &[StateMeaning], several: Option<usize>, weigh
     }
 }
 
-/// Divides the probability of the unknown among its states as `predicted` does; the first has it
-/// all where that holds none of it possible.
-fn share_unknown(states: &[StateMeaning], predicted: &[f64], weights: &mut [f64]) {
-    let is_unknown = |meaning: &StateMeaning| meaning.subject == Subject::Unknown;
-    let of_unknown = || states.iter().zip(predicted).filter(|(m, _)| is_unknown(m));
-    let sum: f64 = of_unknown().map(|(_, b)| b).sum();
-    let mut weight: f64 = 0.0;
-    let shares = weights.iter_mut().zip(states).zip(predicted);
-    let shares = shares.filter(|((_, m), _)| is_unknown(m));
-    for (at, ((share, _), b)) in shares.enumerate() {
-        if at == 0 {
-            weight = *share;
+/// Leaves the states whose leaves an action answers one at a time what it would answer: the most
+/// probable leaf. Returns what is taken away: a fault, but nobody knows of which wheel.
+fn leave_answered(
+    diagnosis: &FaultBelief,
+    states: &[StateMeaning],
+    answerable: &AnswerableFaults,
+    weights: &mut [f64],
+) -> f64 {
+    let mut unsure = 0.0;
+    for (weight, meaning) in weights.iter_mut().zip(states) {
+        if meaning.subject == Subject::Fault && answerable.are_singles(meaning.leaves) {
+            let alone = leaves(diagnosis, *meaning).map(|(leaf, p)| alone(diagnosis, leaf, p));
+            let answered = weight.min(alone.fold(0.0, f64::max));
+            unsure += *weight - answered;
+            *weight = answered;
         }
-        *share = match (sum > 0.0, at) {
-            (true, _) => weight * (b / sum),
-            (false, 0) => weight,
-            (false, _) => 0.0,
-        };
     }
+    unsure
+}
+
+/// What the sets that are reported leave of a leaf's probability.
+fn alone(diagnosis: &FaultBelief, leaf: usize, p: f64) -> f64 {
+    let holds = |set: &&FaultSet| set.leaves >> leaf & 1 == 1;
+    let in_sets: f64 = sets_of_several(diagnosis)
+        .filter(holds)
+        .map(|set| set.p)
+        .sum();
+    p - in_sets
 }
 
 /// Sets in use of two faults or more.
@@ -169,7 +185,8 @@ pub(crate) fn is_sound(diagnosis: &FaultBelief, states: &[StateMeaning], tree_ha
     let own = [diagnosis.p[0], diagnosis.p_unknown];
     let of_leaves = states
         .iter()
-        .flat_map(|meaning| leaves(diagnosis, *meaning));
+        .flat_map(|meaning| leaves(diagnosis, *meaning))
+        .map(|(_, p)| p);
     let of_sets = reported(diagnosis).map(|set| set.p);
     let are_probabilities = own
         .into_iter()

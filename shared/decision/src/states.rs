@@ -9,8 +9,9 @@ use crate::error::SupervisorError;
 
 /// Name of the decision model's state for deviations that no fault model explains.
 const UNKNOWN: &str = "UNKNOWN";
-/// Name of the same deviation after some time, when waiting for a name has not helped.
-const UNKNOWN_OLD: &str = "UNKNOWN_OLD";
+/// End of the name of a state that stands for the same as that with the name before it, while
+/// evidence of it comes. What is in doubt when it ends stays in doubt.
+const NEW: &str = "_NEW";
 /// Name of the state of all named faults that have no state of their own. It may be of none.
 const FAULT: &str = "FAULT";
 /// Name of the state of two faults or more.
@@ -44,6 +45,8 @@ pub(crate) struct StateMeaning {
     pub subject: Subject,
     /// Its leaves, as bits.
     pub leaves: u64,
+    /// The state that stands for the same once no more evidence comes, if this one is new.
+    pub settled: Option<usize>,
 }
 
 /// What an action may do about a leaf.
@@ -99,8 +102,9 @@ pub(crate) fn leaves(tree: &FaultTree, robot: &Description) -> Vec<Leaf> {
 
 /// True if a state may have this name because of what it says about the hardware.
 pub(crate) fn is_of_hardware(name: &str, tree: &FaultTree) -> bool {
+    let name = name.strip_suffix(NEW).unwrap_or(name);
     let names = |leaf| tree.state_names(leaf).any(|of_leaf| of_leaf == name);
-    matches!(name, UNKNOWN | UNKNOWN_OLD | FAULT | SEVERAL | DRIVABLE)
+    matches!(name, UNKNOWN | FAULT | SEVERAL | DRIVABLE)
         || tree
             .nodes()
             .first()
@@ -117,9 +121,11 @@ pub(crate) fn states(
     tree: &FaultTree,
 ) -> Result<Vec<StateMeaning>, SupervisorError> {
     let nominal = tree.nodes()[0].name.as_str();
+    let at = |name: &str| names.iter().position(|state| state == name);
     let meaning = |name: &String| StateMeaning {
-        subject: match name.as_str() {
-            UNKNOWN | UNKNOWN_OLD => Subject::Unknown,
+        settled: name.strip_suffix(NEW).and_then(at),
+        subject: match name.strip_suffix(NEW).unwrap_or(name) {
+            UNKNOWN => Subject::Unknown,
             SEVERAL => Subject::Several,
             DRIVABLE => Subject::Drivable,
             DONE => Subject::Done,
@@ -136,7 +142,7 @@ pub(crate) fn states(
     for leaf in tree.leaves() {
         let holds = |name: &str| {
             let same = |(state, meaning): (&String, &StateMeaning)| {
-                state == name && meaning.subject == Subject::Fault
+                state == name && meaning.subject == Subject::Fault && meaning.settled.is_none()
             };
             names.iter().zip(&meanings).position(same)
         };
@@ -145,8 +151,14 @@ pub(crate) fn states(
             found.ok_or_else(|| SupervisorError::NoState(tree.nodes()[leaf].name.clone()))?;
         meanings[state].leaves |= 1 << leaf;
     }
+    for state in 0..meanings.len() {
+        if let Some(settled) = meanings[state].settled {
+            meanings[state].leaves = meanings[settled].leaves;
+        }
+    }
     let is_empty = |(name, meaning): &(&String, &StateMeaning)| {
-        meaning.subject == Subject::Fault && meaning.leaves == 0 && *name != FAULT
+        let may_be_empty = *name == FAULT || meaning.settled.is_some();
+        meaning.subject == Subject::Fault && meaning.leaves == 0 && !may_be_empty
     };
     match names.iter().zip(&meanings).find(is_empty) {
         Some((name, _)) => Err(SupervisorError::NoLeaf(name.clone())),
@@ -196,8 +208,8 @@ mod tests {
                 &[0, 0, 60, 0, 0, 0],
             ),
             (
-                "ND UNKNOWN UNKNOWN_OLD STUCK GYRO FAULT",
-                &[0, 0, 0, 28, 32, 0],
+                "ND UNKNOWN UNKNOWN_NEW STUCK STUCK_NEW GYRO FAULT",
+                &[0, 0, 0, 28, 28, 32, 0],
             ),
         ] {
             assert_eq!(held(names).unwrap(), wanted, "{names}");

@@ -81,8 +81,8 @@ impl SymptomDecision {
         let Some(hardware) = &mut self.hardware else {
             return;
         };
-        let (drivable, belief) = (self.wheels.drivable(), self.process.tracker.belief());
-        hardware.take(diagnosis, drivable, situation, belief);
+        let (answerable, belief) = (self.wheels.answerable(), self.process.tracker.belief());
+        hardware.take(diagnosis, answerable, situation, belief);
         let wheels_moved = self.wheels.have_moved(diagnosis);
         if wheels_moved {
             self.wheels.take(diagnosis);

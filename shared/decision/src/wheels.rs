@@ -5,7 +5,7 @@ use vigil_blocks::{Action, AnsweredWheels, FAULT_NODES, FAULT_SETS, FaultBelief,
 use vigil_pomdp::Pomdp;
 use vigil_robot::{Description, FaultTree, counter_steering};
 
-use crate::drivable::DrivableSets;
+use crate::answerable::AnswerableFaults;
 use crate::error::SupervisorError;
 use crate::mapping::{self, ActionMeaning, Compensation};
 use crate::states::{self, Leaf, LeafKind};
@@ -25,7 +25,7 @@ pub(crate) struct Wheels {
     /// Probability of every node of the tree, and the most probable sets, as of the last decision.
     p: [f64; FAULT_NODES],
     sets: [FaultSet; FAULT_SETS],
-    drivable: DrivableSets,
+    answerable: AnswerableFaults,
     compensation: Vec<Compensation>,
     about: AnsweredWheels,
 }
@@ -43,7 +43,7 @@ impl Wheels {
         let leaves = states::leaves(tree, robot);
         mapping::check_compensation(model, &leaves, actions, &compensation)?;
         Ok(Self {
-            drivable: DrivableSets::new(&leaves, robot, &compensation),
+            answerable: AnswerableFaults::new(&leaves, actions, robot, &compensation),
             leaves,
             p: [0.0; FAULT_NODES],
             sets: [FaultSet { leaves: 0, p: 0.0 }; FAULT_SETS],
@@ -74,8 +74,8 @@ impl Wheels {
     }
 
     /// The sets that an action can answer as one.
-    pub(crate) const fn drivable(&self) -> &DrivableSets {
-        &self.drivable
+    pub(crate) const fn answerable(&self) -> &AnswerableFaults {
+        &self.answerable
     }
 
     /// Leaves of one state are treated alike, but for the wheel.
@@ -163,7 +163,7 @@ impl Wheels {
     }
 
     fn drivable_sets(&self) -> impl Iterator<Item = (AnsweredWheels, f64)> {
-        let drivable = |set: &&FaultSet| self.drivable.holds(set.leaves);
+        let drivable = |set: &&FaultSet| self.answerable.are_drivable(set.leaves);
         let sets = self.sets.iter().filter(drivable);
         sets.map(|set| (self.answered(set.leaves), set.p))
     }

@@ -118,7 +118,7 @@ fn what_is_unknown_is_a_place_that_is_lost_or_a_fault_that_nobody_has_modelled()
     robot.rest(1.0, 0);
     assert_eq!(robot.kind(), RecoveryKind::Relocalise);
     robot.ended(ActionOutcome::Succeeded, 0);
-    let unknown = robot.p("UNKNOWN") + robot.p("UNKNOWN_OLD");
+    let unknown = robot.p("UNKNOWN") + robot.p("UNKNOWN_NEW");
     assert!(unknown > robot.p("LST"), "{unknown}");
     // Without a state of a lost robot it is the hardware's.
     let mut alone = joint_settings();
@@ -129,7 +129,7 @@ fn what_is_unknown_is_a_place_that_is_lost_or_a_fault_that_nobody_has_modelled()
     robot.detection.alarm = 1;
     robot.unknown(0.999);
     robot.cycle(0);
-    assert!((robot.p("UNKNOWN") + robot.p("UNKNOWN_OLD") - 0.999).abs() < 1e-6);
+    assert!((robot.p("UNKNOWN") + robot.p("UNKNOWN_NEW") - 0.999).abs() < 1e-6);
     robot.rest(31.0, 0);
     assert_eq!(robot.kind(), RecoveryKind::CallForHelp);
 }

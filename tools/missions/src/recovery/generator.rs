@@ -2,7 +2,9 @@
 
 use crate::model_text::{line, number};
 
-use super::parameters::{ActionParameters, DRIVABLE, Drivable, Fault, ParameterError, Parameters};
+use super::parameters::{
+    ActionParameters, DRIVABLE, Drivable, Fault, NEW, ParameterError, Parameters,
+};
 
 const HEAD: &str = "\
 # What to do about a fault. Generated: change the parameters, not this file.
@@ -18,14 +20,16 @@ enum Condition<'a> {
     Fault(&'a Fault),
     Several,
     Drivable(Drivable),
-    Unknown { is_old: bool },
+    Unknown,
     Done,
 }
 
 /// A state.
 struct State<'a> {
-    name: &'a str,
+    name: String,
     condition: Condition<'a>,
+    /// True while evidence of it comes.
+    is_new: bool,
 }
 
 /// Writes the model, in Cassandra's format.
@@ -38,7 +42,9 @@ pub fn generate(parameters: &Parameters) -> Result<String, ParameterError> {
         parameters,
         states: states(parameters),
     };
-    let names: Vec<&str> = model.states.iter().map(|state| state.name).collect();
+    let names = model.states.iter().map(|state| state.name.as_str());
+    let names: Vec<&str> = names.collect();
+    let seen: Vec<&str> = model.shown().map(|state| state.name.as_str()).collect();
     let actions = parameters.action.iter().map(|action| action.name.as_str());
     let actions: Vec<&str> = actions.chain([parameters.help.action.as_str()]).collect();
     let mut text = String::from(HEAD);
@@ -48,7 +54,7 @@ pub fn generate(parameters: &Parameters) -> Result<String, ParameterError> {
     line(&mut text, &format!("actions: {}", actions.join(" ")));
     line(
         &mut text,
-        &format!("observations: none {}", names.join(" ")),
+        &format!("observations: none settled {}", seen.join(" ")),
     );
     line(&mut text, &format!("start: {}", row(&model.start())));
     write_transitions(&mut text, &model)?;
@@ -60,7 +66,7 @@ pub fn generate(parameters: &Parameters) -> Result<String, ParameterError> {
 fn write_transitions(text: &mut String, model: &Model<'_>) -> Result<(), ParameterError> {
     line(
         text,
-        "\n# What arises, joins, is named, grows old, passes, ends.",
+        "\n# What arises, joins, is named, settles, passes, ends.",
     );
     for action in &model.parameters.action {
         for (from, state) in model.states.iter().enumerate() {
@@ -83,8 +89,8 @@ fn write_observations(text: &mut String, model: &Model<'_>) {
     let actions = model.parameters.action.iter();
     let actions = actions.map(|action| (action.name.as_str(), action.sees));
     for (action, sees) in actions.chain([(model.parameters.help.action.as_str(), 0.0)]) {
-        for (to, state) in model.states.iter().enumerate() {
-            let seen = row(&model.seen(sees, to));
+        for state in &model.states {
+            let seen = row(&model.seen(sees, state));
             line(text, &format!("O: {action} : {}\n{seen}", state.name));
         }
     }
@@ -112,23 +118,37 @@ fn write_rewards(text: &mut String, model: &Model<'_>) {
     }
 }
 
-/// States in the model's order: nominal first, the end last.
+/// States in the model's order: nominal first, then the new ones, and the end last.
 fn states(parameters: &Parameters) -> Vec<State<'_>> {
-    let state = |name, condition| State { name, condition };
+    let state = |name: &str, condition| State {
+        name: name.to_owned(),
+        condition,
+        is_new: false,
+    };
     let faults = parameters.fault.iter();
-    let faults = faults.map(|fault| state(fault.state.as_str(), Condition::Fault(fault)));
+    let faults = faults.map(|fault| state(&fault.state, Condition::Fault(fault)));
     let drivable = parameters.several.drivable.into_iter();
     let drivable = drivable.map(|of| state(DRIVABLE, Condition::Drivable(of)));
-    std::iter::once(state("ND", Condition::Nominal))
+    let settled: Vec<State<'_>> = std::iter::once(state("ND", Condition::Nominal))
         .chain(faults)
         .chain([state("SEVERAL", Condition::Several)])
         .chain(drivable)
-        .chain([
-            state("UNKNOWN", Condition::Unknown { is_old: false }),
-            state("UNKNOWN_OLD", Condition::Unknown { is_old: true }),
-            state("DONE", Condition::Done),
-        ])
-        .collect()
+        .chain([state("UNKNOWN", Condition::Unknown)])
+        .collect();
+    let new: Vec<State<'_>> = settled.iter().map(State::renewed).collect();
+    let all = settled.into_iter().chain(new);
+    all.chain([state("DONE", Condition::Done)]).collect()
+}
+
+impl State<'_> {
+    /// The same, while evidence of it comes.
+    fn renewed(&self) -> Self {
+        Self {
+            name: format!("{}{NEW}", self.name),
+            condition: self.condition,
+            is_new: true,
+        }
+    }
 }
 
 struct Model<'a> {
@@ -144,46 +164,50 @@ impl Model<'_> {
             .collect()
     }
 
-    /// How often each state arises in a healthy robot, 1/h.
-    fn arises_1_h(&self) -> impl Iterator<Item = f64> {
-        self.states.iter().map(|state| match state.condition {
+    /// How often a state arises in a healthy robot, 1/h: all that arises is new.
+    fn arises_1_h(&self, state: &State<'_>) -> f64 {
+        match state.condition {
+            _ if !state.is_new => 0.0,
             Condition::Fault(fault) => fault.arises_1_h,
-            Condition::Unknown { is_old: false } => self.parameters.unknown.arises_1_h,
+            Condition::Unknown => self.parameters.unknown.arises_1_h,
             _ => 0.0,
-        })
+        }
     }
 
     /// An alarm that has just risen.
     fn start(&self) -> Vec<f64> {
         let nominal = self.parameters.evidence.nominal_at_an_alarm;
-        let sum: f64 = self.arises_1_h().sum();
-        let share = |arises_1_h: f64| match sum > 0.0 {
+        let arises_1_h: Vec<f64> = self.states.iter().map(|it| self.arises_1_h(it)).collect();
+        let sum: f64 = arises_1_h.iter().sum();
+        let share = |arises_1_h: &f64| match sum > 0.0 {
             true => (1.0 - nominal) * arises_1_h / sum,
             false => 0.0,
         };
-        let mut start: Vec<f64> = self.arises_1_h().map(share).collect();
-        start[0] = 1.0 - start.iter().sum::<f64>();
+        let mut start: Vec<f64> = arises_1_h.iter().map(share).collect();
+        let faulty: f64 = start.iter().sum();
+        let is_nominal = |it: &State<'_>| it.is_new && matches!(it.condition, Condition::Nominal);
+        if let Some(nominal) = self.states.iter().position(is_nominal) {
+            start[nominal] = 1.0 - faulty;
+        }
         start
     }
 
     /// Distribution of the next state. While a robot stands, nothing is known to happen.
     fn next(&self, action: &ActionParameters, from: usize) -> Result<Vec<f64>, ParameterError> {
         let epoch_s = self.parameters.epoch_s;
-        let condition = self.states[from].condition;
-        if matches!(condition, Condition::Done) || action.speed_scale == 0.0 {
+        let before = &self.states[from];
+        if matches!(before.condition, Condition::Done) || action.speed_scale == 0.0 {
             return Ok(self.only(from));
         }
-        let rates_1_s = self.states.iter().zip(self.arises_1_h());
-        let rates_1_s = rates_1_s.map(|(to, arises_1_h)| match condition {
-            Condition::Nominal if !matches!(to.condition, Condition::Done) => arises_1_h / 3600.0,
-            _ => self.rate_1_s(action, condition, to.condition),
-        });
+        let rates_1_s = self
+            .states
+            .iter()
+            .map(|to| self.rate_1_s(action, before, to));
         let mut next: Vec<f64> = rates_1_s.map(|rate_1_s| rate_1_s * epoch_s).collect();
-        next[from] = 0.0;
         let sum: f64 = next.iter().sum();
         if sum > 1.0 {
             return Err(ParameterError::Fast {
-                state: self.states[from].name.to_owned(),
+                state: before.name.clone(),
                 sum,
                 epoch_s,
             });
@@ -192,58 +216,65 @@ impl Model<'_> {
         Ok(next)
     }
 
-    /// How often a state that is not nominal becomes another, and any the end, 1/s.
-    fn rate_1_s(&self, action: &ActionParameters, from: Condition<'_>, to: Condition<'_>) -> f64 {
+    /// How often a state becomes another, 1/s. What changes is new; what is new settles.
+    fn rate_1_s(&self, action: &ActionParameters, from: &State<'_>, to: &State<'_>) -> f64 {
         let Parameters {
             task,
             several,
             unknown,
+            evidence,
             ..
         } = self.parameters;
-        let is_named = |state: &&State<'_>| matches!(state.condition, Condition::Fault(_));
-        match (from, to) {
-            (_, Condition::Done) => task.speed_m_s * action.speed_scale / task.rest_m,
+        if matches!(to.condition, Condition::Done) {
+            return task.speed_m_s * action.speed_scale / task.rest_m;
+        }
+        if !to.is_new {
+            let settles = from.is_new && from.name == to.renewed().name;
+            return if settles { evidence.settles_1_s } else { 0.0 };
+        }
+        match (from.condition, to.condition) {
+            (Condition::Nominal, _) => self.arises_1_h(to) / 3600.0,
+            // What is wrong and has settled stays.
+            _ if !from.is_new => 0.0,
             (Condition::Fault(fault), Condition::Nominal) => fault.passes_1_s,
             (Condition::Fault(_), Condition::Several) => {
                 let drivable = several.drivable.map_or(0.0, |it| it.share);
                 several.arises_1_s * (1.0 - drivable)
             }
             (Condition::Fault(_), Condition::Drivable(it)) => several.arises_1_s * it.share,
-            (Condition::Unknown { is_old: false }, Condition::Nominal) => unknown.passes_1_s,
-            (Condition::Unknown { is_old: false }, Condition::Fault(_)) => {
-                unknown.named_1_s / self.states.iter().filter(is_named).count() as f64
-            }
-            (Condition::Unknown { is_old: false }, Condition::Unknown { is_old: true }) => {
-                unknown.ages_1_s
+            (Condition::Unknown, Condition::Nominal) => unknown.passes_1_s,
+            (Condition::Unknown, Condition::Fault(_)) => {
+                unknown.named_1_s / self.parameters.fault.len() as f64
             }
             _ => 0.0,
         }
     }
 
-    /// Distribution of the observation in a state: none, then every state's name. Nobody sees how
-    /// old what is unknown is; the end is always seen.
-    fn seen(&self, sees: f64, to: usize) -> Vec<f64> {
-        let done = self.states.len() - 1;
-        let mut seen = vec![0.0; self.states.len() + 1];
-        if to == done {
-            seen[done + 1] = 1.0;
-            return seen;
-        }
-        let new = |state: &State<'_>| {
-            !matches!(
-                state.condition,
-                Condition::Unknown { is_old: true } | Condition::Done
-            )
+    /// The states that are ever seen.
+    fn shown(&self) -> impl Iterator<Item = &State<'_>> {
+        let is_shown = |it: &&State<'_>| it.is_new || matches!(it.condition, Condition::Done);
+        self.states.iter().filter(is_shown)
+    }
+
+    /// Distribution of the observation in a state: none, settled, then the name of every one that
+    /// is ever seen. That no more evidence comes is seen, and the end is.
+    fn seen(&self, sees: f64, of: &State<'_>) -> Vec<f64> {
+        let (sees, confused) = match of.condition {
+            Condition::Done => (1.0, 0.0),
+            _ if of.is_new => (sees, self.parameters.evidence.confused),
+            _ => (0.0, 0.0),
         };
-        let is_unknown = |at: usize| matches!(self.states[at].condition, Condition::Unknown { .. });
-        let spoken: Vec<usize> = (0..done).filter(|at| new(&self.states[*at])).collect();
-        let wrong = sees * self.parameters.evidence.confused / (spoken.len() as f64 - 1.0).max(1.0);
-        for at in spoken {
-            let is_true = at == to || (is_unknown(at) && is_unknown(to));
-            seen[at + 1] = if is_true { sees } else { wrong };
-        }
-        seen[0] = 1.0 - seen.iter().sum::<f64>();
-        seen
+        let others = (self.shown().count() as f64 - 2.0).max(1.0);
+        let seen = self.shown().map(|state| match state.condition {
+            _ if state.name == of.name => sees,
+            Condition::Done => 0.0,
+            _ => sees * confused / others,
+        });
+        let seen: Vec<f64> = seen.collect();
+        let is_settled = !of.is_new && !matches!(of.condition, Condition::Done);
+        let settled = f64::from(u8::from(is_settled));
+        let none = 1.0 - settled - seen.iter().sum::<f64>();
+        [none, settled].into_iter().chain(seen).collect()
     }
 
     /// Price of a step.
@@ -261,7 +292,7 @@ impl Model<'_> {
             Condition::Several | Condition::Drivable(_) => {
                 (parameters.several.price_1_m * scale, false)
             }
-            Condition::Unknown { .. } => (parameters.unknown.price_1_m * scale, false),
+            Condition::Unknown => (parameters.unknown.price_1_m * scale, false),
         };
         let needless_1_m = if is_answered {
             0.0

@@ -5,6 +5,9 @@ use serde::Deserialize;
 /// Name of the state of several faults with which a robot can be driven home.
 pub(super) const DRIVABLE: &str = "SEVERAL_DRIVABLE";
 
+/// End of the name of a state of which evidence comes.
+pub(super) const NEW: &str = "_NEW";
+
 /// Everything that the model is made from. Prices are in units of the
 /// user's choice, the same for all.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -124,8 +127,6 @@ pub struct Unknown {
     pub price_1_m: f64,
     /// How often a new one turns out to have a name, 1/s.
     pub named_1_s: f64,
-    /// How often a new one grows old, 1/s.
-    pub ages_1_s: f64,
 }
 
 /// What a step's evidence speaks for.
@@ -137,6 +138,8 @@ pub struct Evidence {
     /// Chance that nothing is wrong where a policy is begun. A policy is solved for an alarm that
     /// has just risen: the live belief is the identifier's from the first cycle on.
     pub nominal_at_an_alarm: f64,
+    /// How often evidence ends, 1/s: what is in doubt by then stays in doubt.
+    pub settles_1_s: f64,
 }
 
 /// Why parameters were refused.
@@ -154,8 +157,8 @@ pub enum ParameterError {
     },
     /// Two states have one name.
     #[error(
-        "state '{0}' appears twice; ND, SEVERAL, SEVERAL_DRIVABLE, UNKNOWN, UNKNOWN_OLD and DONE \
-         have a meaning of their own"
+        "state '{0}' appears twice; ND, SEVERAL, SEVERAL_DRIVABLE, UNKNOWN, DONE and what ends in \
+         _NEW have a meaning of their own"
     )]
     SameState(String),
     /// An action answers a fault that is not there.
@@ -218,10 +221,11 @@ impl Parameters {
         if let Some(drivable) = self.several.drivable {
             share("several.drivable.share".into(), drivable.share)?;
         }
-        let always = ["ND", "SEVERAL", DRIVABLE, "UNKNOWN", "UNKNOWN_OLD", "DONE"];
+        let always = ["ND", "SEVERAL", DRIVABLE, "UNKNOWN", "DONE"];
         for (at, fault) in self.fault.iter().enumerate() {
             let before = self.fault[..at].iter().map(|other| other.state.as_str());
-            if before.chain(always).any(|name| name == fault.state) {
+            let is_taken = before.chain(always).any(|name| name == fault.state);
+            if is_taken || fault.state.ends_with(NEW) {
                 return Err(ParameterError::SameState(fault.state.clone()));
             }
         }
@@ -263,7 +267,7 @@ impl Parameters {
             ("unknown.passes_1_s", unknown.passes_1_s),
             ("unknown.price_1_m", unknown.price_1_m),
             ("unknown.named_1_s", unknown.named_1_s),
-            ("unknown.ages_1_s", unknown.ages_1_s),
+            ("evidence.settles_1_s", self.evidence.settles_1_s),
         ]
         .map(|(key, found)| (key.to_owned(), found))
         .to_vec();

@@ -59,7 +59,7 @@ fn actions_differ_in_more_than_what_a_step_costs() {
     );
     // Help mends everything in one step, and the rest is as healthy as it can be.
     let (help, stop) = (action(&model, "call_for_help"), action(&model, "stop"));
-    for name in ["STUCK", "SEVERAL", "UNKNOWN_OLD"] {
+    for name in ["STUCK_NEW", "SEVERAL", "UNKNOWN"] {
         assert_eq!(
             model.successors(state(&model, name), help),
             [(nominal, 1.0)]
@@ -67,30 +67,42 @@ fn actions_differ_in_more_than_what_a_step_costs() {
         let stands = state(&model, name);
         assert_eq!(model.successors(stands, stop), [(stands, 1.0)]);
     }
-    // A robot that stands shows nothing.
-    let none = model
-        .observations()
-        .iter()
-        .position(|z| z == "none")
-        .unwrap();
-    assert_eq!(model.likelihood(help, none), model.likelihood(stop, none));
-    let shown = model.likelihood(help, none);
-    let done = state(&model, "DONE");
-    assert!((0..done).all(|s| shown[s] == 1.0) && shown[done] == 0.0);
+    // A robot that stands shows nothing, and neither does what has settled.
+    let seen = |name: &str| model.observations().iter().position(|z| z == name).unwrap();
+    let [none, settled] = ["none", "settled"].map(seen);
+    for a in [help, stop] {
+        for (s, name) in model.states().iter().enumerate() {
+            let shown = [none, settled].map(|z| model.likelihood(a, z)[s]);
+            let wanted = match name.as_str() {
+                "DONE" => [0.0, 0.0],
+                name if name.ends_with("_NEW") => [1.0, 0.0],
+                _ => [0.0, 1.0],
+            };
+            assert_eq!(shown, wanted, "{name}");
+        }
+    }
+    let go = action(&model, "go_on");
+    assert_eq!(model.likelihood(go, settled)[state(&model, "UNKNOWN")], 1.0);
+    assert_eq!(
+        model.likelihood(go, seen("STUCK_NEW"))[state(&model, "STUCK_NEW")],
+        0.5
+    );
 }
 
 #[test]
 fn a_step_is_made_of_the_rates_and_prices_of_the_file() {
     let (model, parameters) = (model(), parameters());
-    let (stuck, slow) = (state(&model, "STUCK"), action(&model, "slow_down"));
+    let (stuck, slow) = (state(&model, "STUCK_NEW"), action(&model, "slow_down"));
     let next = model.successors(stuck, slow);
     let to = |name: &str| {
         let found = next.iter().find(|(s, _)| *s == state(&model, name));
         found.map_or(0.0, |(_, p)| *p)
     };
     // 0.02 /s and 0.002 /s in 0.1 s, four fifths of these drivable, and 1.1 cm of 9 m.
-    assert!((to("ND") - 0.002).abs() < 1e-12 && (to("SEVERAL") - 0.00004).abs() < 1e-12);
-    assert!((to("SEVERAL_DRIVABLE") - 0.00016).abs() < 1e-12);
+    assert!((to("ND_NEW") - 0.002).abs() < 1e-12 && (to("SEVERAL_NEW") - 0.00004).abs() < 1e-12);
+    assert!((to("SEVERAL_DRIVABLE_NEW") - 0.00016).abs() < 1e-12);
+    // Evidence ends twice a second.
+    assert!((to("STUCK") - 0.2).abs() < 1e-12);
     assert!((to("DONE") - 0.22 * 0.5 * 0.1 / 9.0).abs() < 1e-12);
     // Half of 200 a metre for 1.1 cm, and a tenth of a second.
     let price = |s: usize, a: &str| -model.reward(s, action(&model, a));
@@ -111,7 +123,7 @@ fn a_step_is_made_of_the_rates_and_prices_of_the_file() {
 #[test]
 fn the_solved_policy_calls_where_qmdp_waits_for_ever() {
     // Q-MDP believes that the next step tells everything, so that a robot that nobody understands
-    // stands and waits; the solved policy knows that a robot that stands shows nothing.
+    // stands and waits; the solved policy knows that what has settled shows nothing.
     let model = model();
     let file = PolicyFile::read(POLICY, &model).unwrap();
     let mut solved = PointBased::new(&model, &file.vectors).unwrap();
@@ -121,21 +133,34 @@ fn the_solved_policy_calls_where_qmdp_waits_for_ever() {
         let choice = policy.evaluate(&belief(&model, parts), &mut values);
         model.actions()[choice.action].clone()
     };
-    let old = [("ND", 0.01), ("UNKNOWN_OLD", 0.99)];
-    assert_eq!(chosen(&mut qmdp, &old), "stop");
-    assert_eq!(chosen(&mut solved, &old), "call_for_help");
+    for settled in [
+        [("ND", 0.01), ("UNKNOWN", 0.99)],
+        [("ND", 0.3), ("UNKNOWN", 0.7)],
+        [("STUCK", 0.75), ("UNKNOWN", 0.25)],
+        [("STUCK", 0.5), ("ENCODER", 0.5)],
+    ] {
+        assert_eq!(chosen(&mut qmdp, &settled), "stop");
+        assert_eq!(
+            chosen(&mut solved, &settled),
+            "call_for_help",
+            "{settled:?}"
+        );
+    }
     for (parts, wanted) in [
         (&[("ND", 1.0)][..], "go_on"),
         (&[("STUCK", 1.0)], "compensate"),
+        (&[("STUCK_NEW", 1.0)], "compensate"),
+        // The doubt may be resolved as yet.
+        (&[("STUCK_NEW", 0.75), ("UNKNOWN_NEW", 0.25)], "go_on"),
         (&[("ENCODER", 1.0)], "ignore_encoder"),
         (&[("SEVERAL", 1.0)], "call_for_help"),
         (&[("SEVERAL_DRIVABLE", 1.0)], "limp_home"),
-        (&[("ND", 0.5), ("UNKNOWN", 0.5)], "slow_down"),
+        (&[("ND_NEW", 0.1), ("UNKNOWN_NEW", 0.9)], "slow_down"),
     ] {
         assert_eq!(chosen(&mut solved, parts), wanted, "{parts:?}");
     }
     // Bounds are of the start belief.
-    assert!(file.lower <= file.upper.unwrap() && file.upper.unwrap() - file.lower <= 2.0);
+    assert!(file.lower <= file.upper.unwrap() && file.upper.unwrap() - file.lower <= 3.0);
 }
 
 #[test]
@@ -149,7 +174,10 @@ fn the_model_of_any_robot_is_what_its_parameters_generate() {
          and solve again"
     );
     let model = Pomdp::parse(&text).unwrap();
-    let states = ["ND", "FAULT", "SEVERAL", "UNKNOWN", "UNKNOWN_OLD", "DONE"];
+    let settled = ["ND", "FAULT", "SEVERAL", "UNKNOWN"];
+    let new = settled.map(|name| format!("{name}_NEW"));
+    let states = [settled.map(str::to_owned), new].concat();
+    let states = [states, vec!["DONE".to_owned()]].concat();
     assert_eq!(model.states(), states);
     assert!(model.warnings().is_empty());
     let policy = include_bytes!("../../../../config/any-robot.policy.json");
@@ -189,10 +217,11 @@ fn parameters_that_mean_nothing_are_named() {
             (|p| p.fault[2].state = "DONE".to_owned()) as fn(&mut Parameters),
         ),
         ("STUCK", |p| p.fault[1].state = "STUCK".to_owned()),
+        ("SERVO_NEW", |p| p.fault[2].state = "SERVO_NEW".to_owned()),
     ] {
         assert_eq!(refused(change), ParameterError::SameState(name.to_owned()));
     }
     assert!(
-        text(|p| p.unknown.ages_1_s = 20.0).starts_with("the rates out of state UNKNOWN sum to")
+        text(|p| p.evidence.settles_1_s = 20.0).starts_with("the rates out of state ND_NEW sum to")
     );
 }
