@@ -71,8 +71,6 @@ const ROUGH_SD: [f64; 3] = [0.15, 0.1, 0.05];
 /// By the pose alone, a wheel stuck on other ground looks like one that is dragged at, has sunk in
 /// or lost its tyre: how probable these are, given either. Chosen: a stuck wheel stays likelier ..
 const DRAGGED_AT: f64 = 0.25;
-/// .. by far where it drags just as much as was learned ..
-const DRAGGED_AT_LEARNED: f64 = 0.1;
 /// .. and what one wheel does on one ground, another wheel of its side does on another. Chosen:
 /// with [`DRAGGED_AT`] below half is left for the wheel, so that the side is named.
 const P_ALIKE: f64 = 0.4;
@@ -230,7 +228,6 @@ pub fn motion_modes(
     let wheels = || (0..WHEELS).filter(|&w| known(w));
     modes.extend(wheels().map(|w| MotionMode {
         share: learned,
-        p_unknown: if read { 0.0 } else { DRAGGED_AT_LEARNED },
         ..stuck_mode(model, w)
     }));
     for ground in grounds {

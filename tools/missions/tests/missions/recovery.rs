@@ -101,8 +101,8 @@ fn a_step_is_made_of_the_rates_and_prices_of_the_file() {
     // 0.02 /s and 0.002 /s in 0.1 s, four fifths of these drivable, and 1.1 cm of 9 m.
     assert!((to("ND_NEW") - 0.002).abs() < 1e-12 && (to("SEVERAL_NEW") - 0.00004).abs() < 1e-12);
     assert!((to("SEVERAL_DRIVABLE_NEW") - 0.00016).abs() < 1e-12);
-    // Evidence ends twice a second.
-    assert!((to("STUCK") - 0.2).abs() < 1e-12);
+    // Evidence ends five times a second.
+    assert!((to("STUCK") - 0.5).abs() < 1e-12);
     assert!((to("DONE") - 0.22 * 0.5 * 0.1 / 9.0).abs() < 1e-12);
     // Half of 200 a metre for 1.1 cm, and a tenth of a second.
     let price = |s: usize, a: &str| -model.reward(s, action(&model, a));
@@ -160,7 +160,7 @@ fn the_solved_policy_calls_where_qmdp_waits_for_ever() {
         assert_eq!(chosen(&mut solved, parts), wanted, "{parts:?}");
     }
     // Bounds are of the start belief.
-    assert!(file.lower <= file.upper.unwrap() && file.upper.unwrap() - file.lower <= 3.0);
+    assert!(file.lower <= file.upper.unwrap() && file.upper.unwrap() - file.lower <= 1.0);
 }
 
 #[test]
