@@ -7,7 +7,7 @@
 //! counts for the leaf.
 //!
 //! An action that is about one wheel answers the most probable one. That it is another of the same
-//! state counts as unknown.
+//! state counts as unknown. Sets are not divided so: what answers one answers most of another.
 //!
 //! The identifier does not say whether evidence still comes: what it says is of settled states.
 //! What has no name is nothing before the fused alarm: the odds of a departure wander on a healthy

@@ -71,7 +71,7 @@ fn a_rover_limps_home_with_all_that_is_broken_answered() {
     );
     assert_eq!(rover.action.answered(), AnsweredWheels::one_stuck(0));
     rover.demand_counter(&[0]);
-    let kind = rover.believe(&[(&["LF_STUCK", "RM_ENC"], 0.9), (&["LF_STUCK"], 0.1)]);
+    let kind = rover.believe(&[(&["LF_STUCK", "RM_ENC"], 0.98), (&["LF_STUCK"], 0.02)]);
     assert_eq!(kind, RecoveryKind::LimpHome);
     let both = AnsweredWheels::one_stuck(0).with(AnsweredWheels::one_encoder(4));
     assert_eq!(rover.action.answered(), both);
@@ -105,6 +105,21 @@ fn a_rover_limps_home_with_all_that_is_broken_answered() {
         RecoveryKind::Compensate
     );
     assert_eq!(rover.action.answered(), AnsweredWheels::one_stuck(5));
+}
+
+#[test]
+fn whoever_does_not_know_which_wheel_is_stuck_calls_for_help() {
+    for sets in [
+        [(&["LF_STUCK"][..], 0.5), (&["LM_STUCK"], 0.5)],
+        [(&["LF_STUCK"], 0.5), (&["LF_ENC"], 0.5)],
+        [(&["LF_STUCK", "LM_STUCK"], 0.5), (&["LF_STUCK"], 0.5)],
+    ] {
+        let mut rover = Rover::new();
+        for _ in 0..10 {
+            assert_ne!(rover.believe(&sets), RecoveryKind::Compensate, "{sets:?}");
+        }
+        assert_eq!(rover.believe(&sets), RecoveryKind::CallForHelp, "{sets:?}");
+    }
 }
 
 #[test]
