@@ -65,6 +65,15 @@ impl AnswerableFaults {
         }
     }
 
+    /// Such that an action answers any of these leaves (bits), and one all of them.
+    #[cfg(test)]
+    pub(crate) fn drivable(encoders: u64) -> Self {
+        Self {
+            encoders,
+            ..Self::singles(encoders)
+        }
+    }
+
     /// True if an action answers any of these faults, but one at a time.
     pub(crate) const fn are_singles(&self, leaves: u64) -> bool {
         leaves != 0 && leaves & !self.singles == 0

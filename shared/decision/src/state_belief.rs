@@ -7,7 +7,8 @@
 //! counts for the leaf.
 //!
 //! An action that is about one wheel answers the most probable one. That it is another of the same
-//! state counts as unknown. Sets are not divided so: what answers one answers most of another.
+//! state counts as unknown. Sets are not divided so: what answers one answers most of another, and
+//! what is less probable alone than together with another fault.
 //!
 //! The identifier does not say whether evidence still comes: what it says is of settled states.
 //! What has no name is nothing before the fused alarm: the odds of a departure wander on a healthy
@@ -47,10 +48,25 @@ pub(crate) fn write_weights(
         let driven = driven.filter(|_| answerable.are_drivable(set.leaves));
         divide(set, states, driven.or(several), weights);
     }
-    let unsure = leave_answered(diagnosis, states, answerable, weights);
-    let unknown = position(states, Subject::Unknown);
-    if let Some(weight) = unknown.and_then(|unknown| weights.get_mut(unknown)) {
-        *weight += unsure;
+    let driven = driven.and_then(|state| Some((state, most_drivable(diagnosis, answerable)?)));
+    let (mut unsure, mut driven_too) = (0.0, 0.0);
+    for (weight, meaning) in weights.iter_mut().zip(states) {
+        if meaning.subject == Subject::Fault && answerable.are_singles(meaning.leaves) {
+            let part = Part::of(diagnosis, *meaning, driven.map(|(_, set)| set));
+            let answered = part.answered.min(*weight);
+            let also = part.driven_too.min(*weight - answered);
+            unsure += *weight - answered - also;
+            driven_too += also;
+            *weight = answered;
+        }
+    }
+    for (state, more) in [
+        (position(states, Subject::Unknown), unsure),
+        (driven.map(|(state, _)| state), driven_too),
+    ] {
+        if let Some(weight) = state.and_then(|state| weights.get_mut(state)) {
+            *weight += more;
+        }
     }
 }
 
@@ -138,24 +154,39 @@ fn divide(set: &FaultSet, states: &[StateMeaning], several: Option<usize>, weigh
     }
 }
 
-/// Leaves the states whose leaves an action answers one at a time what it would answer: the most
-/// probable leaf. Returns what is taken away: a fault, but nobody knows of which wheel.
-fn leave_answered(
-    diagnosis: &FaultBelief,
-    states: &[StateMeaning],
-    answerable: &AnswerableFaults,
-    weights: &mut [f64],
-) -> f64 {
-    let mut unsure = 0.0;
-    for (weight, meaning) in weights.iter_mut().zip(states) {
-        if meaning.subject == Subject::Fault && answerable.are_singles(meaning.leaves) {
-            let alone = leaves(diagnosis, *meaning).map(|(leaf, p)| alone(diagnosis, leaf, p));
-            let answered = weight.min(alone.fold(0.0, f64::max));
-            unsure += *weight - answered;
-            *weight = answered;
+/// What actions answer of a state whose leaves are answered one at a time. The rest is a fault, but
+/// nobody knows of which wheel.
+struct Part {
+    /// By the action that is about one wheel: the most probable leaf.
+    answered: f64,
+    /// By driving home with the most probable set: leaves of that set that are less probable alone.
+    driven_too: f64,
+}
+
+impl Part {
+    fn of(diagnosis: &FaultBelief, meaning: StateMeaning, driven: Option<&FaultSet>) -> Self {
+        let mut part = Self {
+            answered: 0.0,
+            driven_too: 0.0,
+        };
+        for (leaf, p) in leaves(diagnosis, meaning) {
+            let p = alone(diagnosis, leaf, p);
+            match driven {
+                Some(set) if set.leaves >> leaf & 1 == 1 && set.p > p => part.driven_too += p,
+                _ => part.answered = part.answered.max(p),
+            }
         }
+        part
     }
-    unsure
+}
+
+/// The most probable of the sets that an action can answer as one.
+fn most_drivable<'a>(
+    diagnosis: &'a FaultBelief,
+    answerable: &AnswerableFaults,
+) -> Option<&'a FaultSet> {
+    let drivable = sets_of_several(diagnosis).filter(|set| answerable.are_drivable(set.leaves));
+    drivable.reduce(|best, set| if set.p > best.p { set } else { best })
 }
 
 /// What the sets that are reported leave of a leaf's probability.

@@ -11,6 +11,7 @@ const fn state(subject: Subject, leaves: u64) -> StateMeaning {
 const NOMINAL: StateMeaning = state(Subject::Nominal, 0);
 const UNKNOWN: StateMeaning = state(Subject::Unknown, 0);
 const SEVERAL: StateMeaning = state(Subject::Several, 0);
+const DRIVABLE: StateMeaning = state(Subject::Drivable, 0);
 /// Leaves 1 and 2 are stuck wheels, 3 and 4 are encoders.
 const STUCK: StateMeaning = state(Subject::Fault, 0b00110);
 const ENCODERS: StateMeaning = state(Subject::Fault, 0b11000);
@@ -129,6 +130,24 @@ fn new_states_and_the_end_are_nothing_that_a_diagnosis_says() {
     let states = [UNKNOWN, new, NOMINAL, state(Subject::Done, 0)];
     let said = diagnosis(&[0.5], 0.5);
     near(&weighed(&states, said, &[]), &[0.5, 0.0, 0.5, 0.0]);
+}
+
+#[test]
+fn what_is_less_probable_alone_is_answered_by_driving_home() {
+    let robot = AnswerableFaults::drivable(0b11110);
+    let states = [NOMINAL, STUCK, ENCODERS, SEVERAL, DRIVABLE, UNKNOWN];
+    // Leaf 1 alone has 0.0625, leaf 2 as much; leaves 1 and 3 together have 0.75.
+    let said = diagnosis(&[0.0, 0.8125, 0.0625, 0.75], 0.125);
+    near(
+        &weighed_for(&robot, &states, said, &[(0b01010, 0.75)]),
+        &[0.0, 0.0625, 0.0, 0.0, 0.8125, 0.125],
+    );
+    // Leaf 1 is more probable alone, and then nobody knows.
+    let said = diagnosis(&[0.0, 0.875, 0.0, 0.25], 0.125);
+    near(
+        &weighed_for(&robot, &states, said, &[(0b01010, 0.25)]),
+        &[0.0, 0.625, 0.0, 0.0, 0.25, 0.125],
+    );
 }
 
 #[test]

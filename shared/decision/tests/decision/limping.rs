@@ -71,7 +71,7 @@ fn a_rover_limps_home_with_all_that_is_broken_answered() {
     );
     assert_eq!(rover.action.answered(), AnsweredWheels::one_stuck(0));
     rover.demand_counter(&[0]);
-    let kind = rover.believe(&[(&["LF_STUCK", "RM_ENC"], 0.98), (&["LF_STUCK"], 0.02)]);
+    let kind = rover.believe(&[(&["LF_STUCK", "RM_ENC"], 0.9), (&["LF_STUCK"], 0.1)]);
     assert_eq!(kind, RecoveryKind::LimpHome);
     let both = AnsweredWheels::one_stuck(0).with(AnsweredWheels::one_encoder(4));
     assert_eq!(rover.action.answered(), both);

@@ -176,20 +176,30 @@ impl Model<'_> {
 
     /// An alarm that has just risen.
     fn start(&self) -> Vec<f64> {
-        let nominal = self.parameters.evidence.nominal_at_an_alarm;
-        let arises_1_h: Vec<f64> = self.states.iter().map(|it| self.arises_1_h(it)).collect();
-        let sum: f64 = arises_1_h.iter().sum();
-        let share = |arises_1_h: &f64| match sum > 0.0 {
-            true => (1.0 - nominal) * arises_1_h / sum,
-            false => 0.0,
+        let faulty = 1.0 - self.parameters.evidence.nominal_at_an_alarm;
+        let several = self.parameters.several;
+        let sum: f64 = self.states.iter().map(|it| self.arises_1_h(it)).sum();
+        let share = |state: &State<'_>| match state.condition {
+            _ if !state.is_new => 0.0,
+            Condition::Nominal => 1.0 - faulty,
+            Condition::Several => faulty * several.at_an_alarm * (1.0 - self.drivable()),
+            Condition::Drivable(_) => faulty * several.at_an_alarm * self.drivable(),
+            _ if sum > 0.0 => faulty * (1.0 - several.at_an_alarm) * self.arises_1_h(state) / sum,
+            _ => 0.0,
         };
-        let mut start: Vec<f64> = arises_1_h.iter().map(share).collect();
-        let faulty: f64 = start.iter().sum();
+        let mut start: Vec<f64> = self.states.iter().map(share).collect();
+        // Where nothing arises, nothing is wrong.
+        let rest = 1.0 - start.iter().sum::<f64>();
         let is_nominal = |it: &State<'_>| it.is_new && matches!(it.condition, Condition::Nominal);
         if let Some(nominal) = self.states.iter().position(is_nominal) {
-            start[nominal] = 1.0 - faulty;
+            start[nominal] += rest;
         }
         start
+    }
+
+    /// Share of several faults with which a robot can be driven home.
+    fn drivable(&self) -> f64 {
+        self.parameters.several.drivable.map_or(0.0, |it| it.share)
     }
 
     /// Distribution of the next state. While a robot stands, nothing is known to happen.
@@ -238,10 +248,9 @@ impl Model<'_> {
             _ if !from.is_new => 0.0,
             (Condition::Fault(fault), Condition::Nominal) => fault.passes_1_s,
             (Condition::Fault(_), Condition::Several) => {
-                let drivable = several.drivable.map_or(0.0, |it| it.share);
-                several.arises_1_s * (1.0 - drivable)
+                several.arises_1_s * (1.0 - self.drivable())
             }
-            (Condition::Fault(_), Condition::Drivable(it)) => several.arises_1_s * it.share,
+            (Condition::Fault(_), Condition::Drivable(_)) => several.arises_1_s * self.drivable(),
             (Condition::Unknown, Condition::Nominal) => unknown.passes_1_s,
             (Condition::Unknown, Condition::Fault(_)) => {
                 unknown.named_1_s / self.parameters.fault.len() as f64

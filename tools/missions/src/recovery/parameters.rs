@@ -99,6 +99,8 @@ pub struct Fault {
 pub struct Several {
     /// How often another fault joins one, 1/s.
     pub arises_1_s: f64,
+    /// Chance that they are several where something is wrong at an alarm, 0 to 1.
+    pub at_an_alarm: f64,
     /// Price of a metre at full speed.
     pub price_1_m: f64,
     /// Those with which a robot can be driven home.
@@ -218,6 +220,7 @@ impl Parameters {
         share("evidence.confused".into(), self.evidence.confused)?;
         let nominal = self.evidence.nominal_at_an_alarm;
         share("evidence.nominal_at_an_alarm".into(), nominal)?;
+        share("several.at_an_alarm".into(), self.several.at_an_alarm)?;
         if let Some(drivable) = self.several.drivable {
             share("several.drivable.share".into(), drivable.share)?;
         }

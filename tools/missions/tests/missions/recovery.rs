@@ -117,7 +117,10 @@ fn a_step_is_made_of_the_rates_and_prices_of_the_file() {
     assert!((price(both, "compensate") - alone).abs() < 1e-9);
     let start = model.start();
     let sum = 0.4 + 0.35 + 0.25 + 0.25;
-    assert!((start[stuck] - 0.6 * parameters.fault[0].arises_1_h / sum).abs() < 1e-12);
+    let alone = 0.6 * 0.95;
+    assert!((start[stuck] - alone * parameters.fault[0].arises_1_h / sum).abs() < 1e-12);
+    assert!((start[state(&model, "SEVERAL_DRIVABLE_NEW")] - 0.6 * 0.05 * 0.8).abs() < 1e-12);
+    assert!((start.iter().sum::<f64>() - 1.0).abs() < 1e-12);
 }
 
 #[test]
@@ -155,6 +158,7 @@ fn the_solved_policy_calls_where_qmdp_waits_for_ever() {
         (&[("ENCODER", 1.0)], "ignore_encoder"),
         (&[("SEVERAL", 1.0)], "call_for_help"),
         (&[("SEVERAL_DRIVABLE", 1.0)], "limp_home"),
+        (&[("SEVERAL_DRIVABLE_NEW", 1.0)], "limp_home"),
         (&[("ND_NEW", 0.1), ("UNKNOWN_NEW", 0.9)], "slow_down"),
     ] {
         assert_eq!(chosen(&mut solved, parts), wanted, "{parts:?}");
