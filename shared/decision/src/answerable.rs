@@ -74,6 +74,14 @@ impl AnswerableFaults {
         }
     }
 
+    /// The same, but for faults that are answered one at a time.
+    pub(crate) const fn sets(&self) -> Self {
+        Self {
+            singles: 0,
+            ..*self
+        }
+    }
+
     /// True if an action answers any of these faults, but one at a time.
     pub(crate) const fn are_singles(&self, leaves: u64) -> bool {
         leaves != 0 && leaves & !self.singles == 0

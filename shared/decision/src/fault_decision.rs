@@ -12,7 +12,7 @@ use crate::inputs::Inputs;
 use crate::latch::{Latch, stands};
 use crate::mapping::Compensation;
 use crate::settings::Settings;
-use crate::settling::{Settling, settled};
+use crate::settling::{Settling, folded};
 use crate::state_belief::{self, MOVED, distance, normalise, write_fallback, write_weights};
 use crate::states::{self, StateMeaning, Subject};
 use crate::switching_cost::SwitchingCost;
@@ -72,7 +72,7 @@ impl FaultDecision {
             tree_hash: tree.hash(),
             states,
             wheels,
-            settling: Settling::SETTLED,
+            settling: Settling::of(&[]),
             epoch_clock: EpochClock {
                 epoch_ns: (settings.epoch_ms * 1e6) as u64,
                 t_capture_ns: None,
@@ -89,20 +89,20 @@ impl FaultDecision {
     /// A run begins with nothing wrong, as the identifier's does. The model's own start is what its
     /// policy was solved for.
     fn begin(&mut self) {
-        let is_nominal = |m: &StateMeaning| f64::from(u8::from(m.subject == Subject::Nominal));
+        let is_nominal = |m: &StateMeaning| m.subject == Subject::Nominal && m.settles_to.is_none();
         for (weight, meaning) in self.process.scratch.iter_mut().zip(&self.states) {
-            *weight = is_nominal(meaning);
+            *weight = f64::from(u8::from(is_nominal(meaning)));
         }
         self.process.tracker.anchor(&self.process.scratch);
         self.wheels.forget();
-        self.settling = Settling::SETTLED;
+        self.settling = Settling::of(&self.process.scratch);
         self.decision_t_capture_ns = None;
         self.switching.forget();
         let best = self.process.decider.decide(self.process.tracker.belief());
         self.choose(best.choice());
     }
 
-    fn take_diagnosis(&mut self, diagnosis: &FaultBelief, alarm: bool) {
+    fn take_diagnosis(&mut self, diagnosis: &FaultBelief, situation: Situation) {
         self.begin_run(diagnosis.run_id);
         let t_capture_ns = diagnosis.header.t_capture_ns;
         let timed = self.pass_time(t_capture_ns);
@@ -110,15 +110,23 @@ impl FaultDecision {
         let before = process.tracker.belief();
         let weights = &mut process.scratch;
         let answerable = self.wheels.answerable();
-        write_weights(diagnosis, &self.states, answerable, alarm, weights);
+        write_weights(
+            diagnosis,
+            &self.states,
+            answerable,
+            situation.alarm,
+            weights,
+        );
         normalise(weights);
-        let expected = settled(&self.states, before);
         let mut settling = self.settling;
         if timed {
-            process.log_evidence = log_score(&expected, weights);
+            process.log_evidence = log_score(&folded(&self.states, before), weights);
+        }
+        // Of a robot that rests no evidence comes, and none ends.
+        if timed && !situation.rests {
             settling.pass(&self.states, before);
         }
-        settling.take(&self.states, &expected, weights);
+        settling.take(&self.states, weights);
         settling.write(&self.states, weights);
         let is_due = timed
             || process.control_mode != ControlMode::Policy
@@ -225,7 +233,7 @@ impl DecisionRule for FaultDecision {
         match (diagnosis, detection) {
             (Some(diagnosis), _) => {
                 self.process.losses.diagnosis();
-                self.take_diagnosis(diagnosis, situation.alarm);
+                self.take_diagnosis(diagnosis, situation);
             }
             (None, Some(detection)) if self.process.losses.identifier_is_lost() => {
                 self.fall_back(detection, situation.alarm);

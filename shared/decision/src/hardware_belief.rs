@@ -53,7 +53,9 @@ impl HardwareBelief {
         belief: &[f64],
     ) {
         self.take_by(situation.rests, belief, |states, _, p| {
-            write_weights(diagnosis, states, answerable, situation.alarm, p);
+            // Doubt about the wheel is none about whether it is the hardware.
+            let sets = answerable.sets();
+            write_weights(diagnosis, states, &sets, situation.alarm, p);
             normalise(p);
         });
     }

@@ -100,16 +100,16 @@ impl JointStates {
         start: &[f64],
         joint: &mut [f64],
     ) {
-        let is_unknown = |at: usize| self.subject(at) == Subject::Unknown;
-        let unknown = (0..self.hardware.len()).find(|at| is_unknown(*at));
+        let is_unknown = |m: &StateMeaning| m.subject == Subject::Unknown && m.settles_to.is_none();
+        let unknown = self.hardware.iter().position(is_unknown);
         let mut p = [0.0; DECISION_STATES];
         for (at, of) in hardware.iter().enumerate() {
-            p[self.explanation(at, unknown)] += of;
+            p[self.explanation(at)] += of;
         }
         let lost_is_unknown = unknown.is_some_and(|unknown| p[unknown] > p[0]);
         let explanation = |state: usize| match unknown {
             Some(unknown) if self.is_lost[state] && lost_is_unknown => unknown,
-            _ => self.explanation(self.of_state[state], unknown),
+            _ => self.explanation(self.of_state[state]),
         };
         let mut sums = [Sums::default(); DECISION_STATES];
         for (state, (b, s)) in belief.iter().zip(start).enumerate() {
@@ -130,18 +130,10 @@ impl JointStates {
         }
     }
 
-    /// The states of unknown hardware are one explanation: its first.
-    fn explanation(&self, at: usize, unknown: Option<usize>) -> usize {
-        match unknown {
-            Some(first) if self.subject(at) == Subject::Unknown => first,
-            _ => at,
-        }
-    }
-
-    fn subject(&self, at: usize) -> Subject {
-        self.hardware
-            .get(at)
-            .map_or(Subject::Nominal, |m| m.subject)
+    /// A new state and the settled one that means the same are one explanation.
+    fn explanation(&self, at: usize) -> usize {
+        let settled = self.hardware.get(at).and_then(|m| m.settles_to);
+        settled.unwrap_or(at)
     }
 }
 

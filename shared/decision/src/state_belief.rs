@@ -3,12 +3,13 @@
 //! States exclude each other, faults do not: a set of several faults counts once. It belongs to
 //! SEVERAL_DRIVABLE if a robot can be driven home with it, and to SEVERAL if not, or if the model
 //! does not tell them apart. In a model without these states it belongs to the one that holds all
-//! of its leaves; else to UNKNOWN. What the sets that are reported leave of a leaf's probability
+//! of its leaves, unless an action answers only one of them; else to UNKNOWN. What the sets that are reported leave of a leaf's probability
 //! counts for the leaf.
 //!
-//! An action that is about one wheel answers the most probable one. That it is another of the same
-//! state counts as unknown. Sets are not divided so: what answers one answers most of another, and
-//! what is less probable alone than together with another fault.
+//! An action that is about one wheel answers the most probable one. If another wheel of the same
+//! state has the fault, that counts as unknown. All drivable sets share one state: driving home for
+//! one answers most of another. A single fault that is less probable than the most probable such
+//! set counts for that state, too.
 //!
 //! The identifier does not say whether evidence still comes: what it says is of settled states.
 //! What has no name is nothing before the fused alarm: the odds of a departure wander on a healthy
@@ -48,11 +49,12 @@ pub(crate) fn write_weights(
         let driven = driven.filter(|_| answerable.are_drivable(set.leaves));
         divide(set, states, driven.or(several), weights);
     }
-    let driven = driven.and_then(|state| Some((state, most_drivable(diagnosis, answerable)?)));
+    let driven =
+        driven.and_then(|state| Some((state, most_probable_drivable(diagnosis, answerable)?)));
     let (mut unsure, mut driven_too) = (0.0, 0.0);
     for (weight, meaning) in weights.iter_mut().zip(states) {
         if meaning.subject == Subject::Fault && answerable.are_singles(meaning.leaves) {
-            let part = Part::of(diagnosis, *meaning, driven.map(|(_, set)| set));
+            let part = AnsweredPart::of(diagnosis, *meaning, driven.map(|(_, set)| set));
             let answered = part.answered.min(*weight);
             let also = part.driven_too.min(*weight - answered);
             unsure += *weight - answered - also;
@@ -92,6 +94,7 @@ pub(crate) fn write_fallback(
     let weights = weights.iter_mut().enumerate();
     for (((state, weight), b), meaning) in weights.zip(before).zip(states) {
         *weight = match meaning.subject {
+            Subject::Nominal if meaning.settles_to.is_some() => 0.0,
             Subject::Nominal => 1.0 - p_fault,
             Subject::Done => 0.0,
             _ if faulty > 0.0 => p_fault * (b / faulty),
@@ -114,7 +117,7 @@ pub(crate) fn distance(one: &[f64], other: &[f64]) -> f64 {
 }
 
 fn position(states: &[StateMeaning], subject: Subject) -> Option<usize> {
-    let is_it = |meaning: &StateMeaning| meaning.subject == subject && meaning.settled.is_none();
+    let is_it = |meaning: &StateMeaning| meaning.subject == subject && meaning.settles_to.is_none();
     states.iter().position(is_it)
 }
 
@@ -122,7 +125,7 @@ fn position(states: &[StateMeaning], subject: Subject) -> Option<usize> {
 /// more than 1 where they may be present together.
 fn probability(diagnosis: &FaultBelief, meaning: StateMeaning, alarm: bool) -> f64 {
     match meaning.subject {
-        _ if meaning.settled.is_some() => 0.0,
+        _ if meaning.settles_to.is_some() => 0.0,
         Subject::Unknown if alarm => diagnosis.p_unknown,
         Subject::Nominal if !alarm => (diagnosis.p[0] + diagnosis.p_unknown).min(1.0),
         Subject::Nominal => diagnosis.p[0],
@@ -145,7 +148,7 @@ fn divide(set: &FaultSet, states: &[StateMeaning], several: Option<usize>, weigh
         *weight = (*weight - own * set.p).max(0.0);
     }
     let holds =
-        |meaning: &StateMeaning| meaning.settled.is_none() && set.leaves & !meaning.leaves == 0;
+        |meaning: &StateMeaning| meaning.settles_to.is_none() && set.leaves & !meaning.leaves == 0;
     let state = several
         .or_else(|| states.iter().position(holds))
         .or_else(|| position(states, Subject::Unknown));
@@ -156,14 +159,14 @@ fn divide(set: &FaultSet, states: &[StateMeaning], several: Option<usize>, weigh
 
 /// What actions answer of a state whose leaves are answered one at a time. The rest is a fault, but
 /// nobody knows of which wheel.
-struct Part {
+struct AnsweredPart {
     /// By the action that is about one wheel: the most probable leaf.
     answered: f64,
     /// By driving home with the most probable set: leaves of that set that are less probable alone.
     driven_too: f64,
 }
 
-impl Part {
+impl AnsweredPart {
     fn of(diagnosis: &FaultBelief, meaning: StateMeaning, driven: Option<&FaultSet>) -> Self {
         let mut part = Self {
             answered: 0.0,
@@ -181,7 +184,7 @@ impl Part {
 }
 
 /// The most probable of the sets that an action can answer as one.
-fn most_drivable<'a>(
+fn most_probable_drivable<'a>(
     diagnosis: &'a FaultBelief,
     answerable: &AnswerableFaults,
 ) -> Option<&'a FaultSet> {
@@ -196,7 +199,7 @@ fn alone(diagnosis: &FaultBelief, leaf: usize, p: f64) -> f64 {
         .filter(holds)
         .map(|set| set.p)
         .sum();
-    p - in_sets
+    (p - in_sets).max(0.0)
 }
 
 /// Sets in use of two faults or more.

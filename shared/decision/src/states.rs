@@ -9,8 +9,8 @@ use crate::error::SupervisorError;
 
 /// Name of the decision model's state for deviations that no fault model explains.
 const UNKNOWN: &str = "UNKNOWN";
-/// End of the name of a state that stands for the same as that with the name before it, while
-/// evidence of it comes. What is in doubt when it ends stays in doubt.
+/// A state X_NEW means the same as X, while evidence still comes. What is in doubt when it ends
+/// stays in doubt.
 const NEW: &str = "_NEW";
 /// Name of the state of all named faults that have no state of their own. It may be of none.
 const FAULT: &str = "FAULT";
@@ -46,7 +46,7 @@ pub(crate) struct StateMeaning {
     /// Its leaves, as bits.
     pub leaves: u64,
     /// The state that stands for the same once no more evidence comes, if this one is new.
-    pub settled: Option<usize>,
+    pub settles_to: Option<usize>,
 }
 
 /// What an action may do about a leaf.
@@ -102,13 +102,16 @@ pub(crate) fn leaves(tree: &FaultTree, robot: &Description) -> Vec<Leaf> {
 
 /// True if a state may have this name because of what it says about the hardware.
 pub(crate) fn is_of_hardware(name: &str, tree: &FaultTree) -> bool {
-    let name = name.strip_suffix(NEW).unwrap_or(name);
-    let names = |leaf| tree.state_names(leaf).any(|of_leaf| of_leaf == name);
-    matches!(name, UNKNOWN | FAULT | SEVERAL | DRIVABLE)
+    let settled = name.strip_suffix(NEW).unwrap_or(name);
+    let names = |leaf| {
+        let mut of_leaf = tree.state_names(leaf);
+        of_leaf.any(|of_leaf| of_leaf == name || of_leaf == settled)
+    };
+    matches!(settled, UNKNOWN | FAULT | SEVERAL | DRIVABLE)
         || tree
             .nodes()
             .first()
-            .is_some_and(|nominal| nominal.name == name)
+            .is_some_and(|nominal| nominal.name == settled)
         || tree.leaves().any(names)
 }
 
@@ -123,7 +126,7 @@ pub(crate) fn states(
     let nominal = tree.nodes()[0].name.as_str();
     let at = |name: &str| names.iter().position(|state| state == name);
     let meaning = |name: &String| StateMeaning {
-        settled: name.strip_suffix(NEW).and_then(at),
+        settles_to: name.strip_suffix(NEW).and_then(at),
         subject: match name.strip_suffix(NEW).unwrap_or(name) {
             UNKNOWN => Subject::Unknown,
             SEVERAL => Subject::Several,
@@ -136,13 +139,20 @@ pub(crate) fn states(
     };
     let mut meanings: Vec<StateMeaning> = names.iter().map(meaning).collect();
     let is_there = |name: &&str| names.iter().any(|state| state == name);
-    if let Some(missing) = [nominal, UNKNOWN].into_iter().find(|name| !is_there(name)) {
+    let is_leaf = |name: &str| {
+        let names = |leaf| tree.state_names(leaf).any(|of_leaf| of_leaf == name);
+        tree.leaves().any(names)
+    };
+    let settled = names.iter().filter(|name| !is_leaf(name));
+    let settled = settled.filter_map(|name| name.strip_suffix(NEW));
+    let mut needed = [nominal, UNKNOWN].into_iter().chain(settled);
+    if let Some(missing) = needed.find(|name| !is_there(name)) {
         return Err(SupervisorError::NoState(missing.to_owned()));
     }
     for leaf in tree.leaves() {
         let holds = |name: &str| {
             let same = |(state, meaning): (&String, &StateMeaning)| {
-                state == name && meaning.subject == Subject::Fault && meaning.settled.is_none()
+                state == name && meaning.subject == Subject::Fault && meaning.settles_to.is_none()
             };
             names.iter().zip(&meanings).position(same)
         };
@@ -152,12 +162,12 @@ pub(crate) fn states(
         meanings[state].leaves |= 1 << leaf;
     }
     for state in 0..meanings.len() {
-        if let Some(settled) = meanings[state].settled {
+        if let Some(settled) = meanings[state].settles_to {
             meanings[state].leaves = meanings[settled].leaves;
         }
     }
     let is_empty = |(name, meaning): &(&String, &StateMeaning)| {
-        let may_be_empty = *name == FAULT || meaning.settled.is_some();
+        let may_be_empty = *name == FAULT || meaning.settles_to.is_some();
         meaning.subject == Subject::Fault && meaning.leaves == 0 && !may_be_empty
     };
     match names.iter().zip(&meanings).find(is_empty) {
@@ -224,6 +234,7 @@ mod tests {
         assert_eq!(missing("UNKNOWN FAULT"), no_state("ND"));
         assert_eq!(missing("ND FAULT"), no_state("UNKNOWN"));
         assert_eq!(missing("ND UNKNOWN LEFT R1"), no_state("GYRO"));
+        assert_eq!(missing("ND UNKNOWN STUCK_NEW FAULT"), no_state("STUCK"));
         assert_eq!(missing("ND UNKNOWN SERVO FAULT"), no_leaf("SERVO"));
         // Every stuck wheel has a nearer one.
         assert_eq!(missing("ND UNKNOWN LEFT R1 STUCK GYRO"), no_leaf("STUCK"));

@@ -4,7 +4,7 @@ const fn state(subject: Subject, leaves: u64) -> StateMeaning {
     StateMeaning {
         subject,
         leaves,
-        settled: None,
+        settles_to: None,
     }
 }
 
@@ -124,7 +124,7 @@ fn before_an_alarm_the_unknown_is_nominal() {
 #[test]
 fn new_states_and_the_end_are_nothing_that_a_diagnosis_says() {
     let new = StateMeaning {
-        settled: Some(0),
+        settles_to: Some(0),
         ..UNKNOWN
     };
     let states = [UNKNOWN, new, NOMINAL, state(Subject::Done, 0)];
@@ -153,7 +153,7 @@ fn what_is_less_probable_alone_is_answered_by_driving_home() {
 #[test]
 fn what_is_answered_one_at_a_time_is_only_the_most_probable() {
     let steered_and_ignored = AnswerableFaults::singles(0b11110);
-    // Leaf 1 alone has 0.25, leaf 2 has 0.1875; the pair of 1 and 3 is of no single answer.
+    // Leaf 1 alone has 0.25, leaf 2 has 0.1875; no action on one wheel answers the pair of 1 and 3.
     let said = diagnosis(&[0.0625, 0.5, 0.1875, 0.375], 0.125);
     let sets = [(0b01010, 0.25), (0b00010, 0.25)];
     let states = [NOMINAL, STUCK, ENCODERS, SEVERAL, UNKNOWN];
@@ -161,7 +161,7 @@ fn what_is_answered_one_at_a_time_is_only_the_most_probable() {
         &weighed_for(&steered_and_ignored, &states, said, &sets),
         &[0.0625, 0.25, 0.125, 0.25, 0.125 + 0.1875],
     );
-    // Nobody steers against them: a person treats all alike.
+    // Without counter-steering, every stuck wheel is answered alike.
     let ignored = AnswerableFaults::singles(0b11000);
     near(
         &weighed_for(&ignored, &states, said, &sets),

@@ -1,6 +1,6 @@
 //! Several faults at once, by the rover's shipped model and policy.
 
-use vigil_blocks::{Action, AnsweredWheels, DetectionBelief, Entry, RecoveryKind};
+use vigil_blocks::{Action, AnsweredWheels, ControlMode, DetectionBelief, Entry, RecoveryKind};
 use vigil_decision::{Inputs, Supervisor};
 use vigil_setup::{Setup, load_graph};
 use vigil_supervisor::assemble;
@@ -105,6 +105,47 @@ fn a_rover_limps_home_with_all_that_is_broken_answered() {
         RecoveryKind::Compensate
     );
     assert_eq!(rover.action.answered(), AnsweredWheels::one_stuck(5));
+}
+
+#[test]
+fn a_settled_doubt_stays_and_so_does_what_is_done_about_it() {
+    let mut rover = Rover::new();
+    let doubt: [(&[&str], f64); 2] = [(&["LF_STUCK"], 0.97), (&["LM_STUCK"], 0.03)];
+    rover.believe(&doubt);
+    rover.believe(&doubt);
+    rover.believe(&doubt);
+    let before = rover.action;
+    for _ in 0..300 {
+        assert_eq!(rover.believe(&doubt), RecoveryKind::Compensate);
+        assert_eq!(rover.action.belief, before.belief);
+        assert_eq!(rover.action.decision_seq, before.decision_seq);
+    }
+}
+
+#[test]
+fn without_an_identifier_the_belief_says_what_the_detector_does() {
+    let mut rover = Rover::new();
+    for cycle in 0..100 {
+        rover.t_ns += CYCLE_NS;
+        let alarm = u32::from(cycle >= 50);
+        let mut detection = DetectionBelief {
+            alarm,
+            p_fault: 0.75,
+            ..DetectionBelief::default()
+        };
+        detection.header.t_capture_ns = rover.t_ns;
+        let inputs = Inputs {
+            diagnosis: None,
+            detection: Some(&detection),
+        };
+        let action = &mut rover.action;
+        rover.supervisor.step(Entry::Missed(1), action);
+        rover.supervisor.step(Entry::Frame(inputs), action);
+        // A run begins with nothing wrong, and before an alarm its odds mean nothing.
+        let nominal = if alarm == 0 { 1.0 } else { 0.25 };
+        assert!((action.belief[0] - nominal).abs() < 1e-9, "{cycle}");
+    }
+    assert_eq!(rover.action.control_mode, ControlMode::Fallback as u32);
 }
 
 #[test]

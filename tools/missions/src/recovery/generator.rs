@@ -182,10 +182,10 @@ impl Model<'_> {
         let share = |state: &State<'_>| match state.condition {
             _ if !state.is_new => 0.0,
             Condition::Nominal => 1.0 - faulty,
+            _ if sum <= 0.0 => 0.0,
             Condition::Several => faulty * several.at_an_alarm * (1.0 - self.drivable()),
             Condition::Drivable(_) => faulty * several.at_an_alarm * self.drivable(),
-            _ if sum > 0.0 => faulty * (1.0 - several.at_an_alarm) * self.arises_1_h(state) / sum,
-            _ => 0.0,
+            _ => faulty * (1.0 - several.at_an_alarm) * self.arises_1_h(state) / sum,
         };
         let mut start: Vec<f64> = self.states.iter().map(share).collect();
         // Where nothing arises, nothing is wrong.

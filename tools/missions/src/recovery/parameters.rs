@@ -99,7 +99,7 @@ pub struct Fault {
 pub struct Several {
     /// How often another fault joins one, 1/s.
     pub arises_1_s: f64,
-    /// Chance that they are several where something is wrong at an alarm, 0 to 1.
+    /// Chance, given that something is wrong at an alarm, that it is several faults, 0 to 1.
     pub at_an_alarm: f64,
     /// Price of a metre at full speed.
     pub price_1_m: f64,

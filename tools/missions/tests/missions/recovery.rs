@@ -153,7 +153,7 @@ fn the_solved_policy_calls_where_qmdp_waits_for_ever() {
         (&[("ND", 1.0)][..], "go_on"),
         (&[("STUCK", 1.0)], "compensate"),
         (&[("STUCK_NEW", 1.0)], "compensate"),
-        // The doubt may be resolved as yet.
+        // The doubt may yet be resolved.
         (&[("STUCK_NEW", 0.75), ("UNKNOWN_NEW", 0.25)], "go_on"),
         (&[("ENCODER", 1.0)], "ignore_encoder"),
         (&[("SEVERAL", 1.0)], "call_for_help"),
