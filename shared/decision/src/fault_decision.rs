@@ -72,7 +72,7 @@ impl FaultDecision {
             tree_hash: tree.hash(),
             states,
             wheels,
-            settling: Settling::of(&[]),
+            settling: Settling::new(&[]),
             epoch_clock: EpochClock {
                 epoch_ns: (settings.epoch_ms * 1e6) as u64,
                 t_capture_ns: None,
@@ -95,7 +95,7 @@ impl FaultDecision {
         }
         self.process.tracker.anchor(&self.process.scratch);
         self.wheels.forget();
-        self.settling = Settling::of(&self.process.scratch);
+        self.settling = Settling::new(&self.process.scratch);
         self.decision_t_capture_ns = None;
         self.switching.forget();
         let best = self.process.decider.decide(self.process.tracker.belief());

@@ -25,7 +25,7 @@ pub(crate) struct Settling {
 
 impl Settling {
     /// A run has begun, with nothing wrong: this belief, in settled states.
-    pub(crate) fn of(belief: &[f64]) -> Self {
+    pub(crate) fn new(belief: &[f64]) -> Self {
         let mut held = [0.0; DECISION_STATES];
         held.iter_mut().zip(belief).for_each(|(to, b)| *to = *b);
         Self {
@@ -132,7 +132,7 @@ mod tests {
     impl Robot {
         fn healthy() -> Self {
             Self {
-                settling: Settling::of(&settled([1.0, 0.0, 0.0])),
+                settling: Settling::new(&settled([1.0, 0.0, 0.0])),
                 believed: settled([1.0, 0.0, 0.0]),
             }
         }

@@ -3,8 +3,8 @@
 //! States exclude each other, faults do not: a set of several faults counts once. It belongs to
 //! SEVERAL_DRIVABLE if a robot can be driven home with it, and to SEVERAL if not, or if the model
 //! does not tell them apart. In a model without these states it belongs to the one that holds all
-//! of its leaves, unless an action answers only one of them; else to UNKNOWN. What the sets that are reported leave of a leaf's probability
-//! counts for the leaf.
+//! of its leaves, unless an action answers only one of them; else to UNKNOWN. What the sets that
+//! are reported leave of a leaf's probability counts for the leaf.
 //!
 //! An action that is about one wheel answers the most probable one. If another wheel of the same
 //! state has the fault, that counts as unknown. All drivable sets share one state: driving home for
@@ -54,7 +54,7 @@ pub(crate) fn write_weights(
     let (mut unsure, mut driven_too) = (0.0, 0.0);
     for (weight, meaning) in weights.iter_mut().zip(states) {
         if meaning.subject == Subject::Fault && answerable.are_singles(meaning.leaves) {
-            let part = AnsweredPart::of(diagnosis, *meaning, driven.map(|(_, set)| set));
+            let part = AnsweredPart::new(diagnosis, *meaning, driven.map(|(_, set)| set));
             let answered = part.answered.min(*weight);
             let also = part.driven_too.min(*weight - answered);
             unsure += *weight - answered - also;
@@ -167,7 +167,7 @@ struct AnsweredPart {
 }
 
 impl AnsweredPart {
-    fn of(diagnosis: &FaultBelief, meaning: StateMeaning, driven: Option<&FaultSet>) -> Self {
+    fn new(diagnosis: &FaultBelief, meaning: StateMeaning, driven: Option<&FaultSet>) -> Self {
         let mut part = Self {
             answered: 0.0,
             driven_too: 0.0,
