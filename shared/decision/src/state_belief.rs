@@ -29,6 +29,9 @@ pub(crate) const P_TOLERANCE: f64 = 1e-6;
 /// of its range. Smaller decides in almost every cycle; larger lets a decision wait for its epoch.
 pub(crate) const MOVED: f64 = 0.05;
 
+/// Less than this changes no decision, whichever state it belongs to.
+const NEGLIGIBLE: f64 = 1e-6;
+
 /// A diagnosis says at least this much in all; a sound one sums to 1 or more.
 const P_SUM_MIN: f64 = 0.5;
 
@@ -53,7 +56,8 @@ pub(crate) fn write_weights(
         driven.and_then(|state| Some((state, most_probable_drivable(diagnosis, answerable)?)));
     let (mut unsure, mut driven_too) = (0.0, 0.0);
     for (weight, meaning) in weights.iter_mut().zip(states) {
-        if meaning.subject == Subject::Fault && answerable.are_singles(meaning.leaves) {
+        let is_divided = meaning.subject == Subject::Fault && *weight > NEGLIGIBLE;
+        if is_divided && answerable.are_singles(meaning.leaves) {
             let part = AnsweredPart::new(diagnosis, *meaning, driven.map(|(_, set)| set));
             let answered = part.answered.min(*weight);
             let also = part.driven_too.min(*weight - answered);
