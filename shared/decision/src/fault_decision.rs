@@ -13,7 +13,9 @@ use crate::latch::{Latch, stands};
 use crate::mapping::Compensation;
 use crate::settings::Settings;
 use crate::settling::{Settling, folded};
-use crate::state_belief::{self, MOVED, distance, normalise, write_fallback, write_weights};
+use crate::state_belief::{
+    self, MOVED, distance, normalise, position, write_fallback, write_weights,
+};
 use crate::states::{self, StateMeaning, Subject};
 use crate::switching_cost::SwitchingCost;
 use crate::wheels::Wheels;
@@ -89,9 +91,9 @@ impl FaultDecision {
     /// A run begins with nothing wrong, as the identifier's does. The model's own start is what its
     /// policy was solved for.
     fn begin(&mut self) {
-        let is_nominal = |m: &StateMeaning| m.subject == Subject::Nominal && m.settles_to.is_none();
-        for (weight, meaning) in self.process.scratch.iter_mut().zip(&self.states) {
-            *weight = f64::from(u8::from(is_nominal(meaning)));
+        let nominal = position(&self.states, Subject::Nominal);
+        for (state, weight) in self.process.scratch.iter_mut().enumerate() {
+            *weight = f64::from(u8::from(Some(state) == nominal));
         }
         self.process.tracker.anchor(&self.process.scratch);
         self.wheels.forget();

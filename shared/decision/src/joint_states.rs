@@ -16,6 +16,7 @@ use vigil_pomdp::Pomdp;
 use vigil_robot::FaultTree;
 
 use crate::error::SupervisorError;
+use crate::state_belief::position;
 use crate::states::{self, StateMeaning, Subject};
 
 /// Joins the parts of a name.
@@ -100,8 +101,7 @@ impl JointStates {
         start: &[f64],
         joint: &mut [f64],
     ) {
-        let is_unknown = |m: &StateMeaning| m.subject == Subject::Unknown && m.settles_to.is_none();
-        let unknown = self.hardware.iter().position(is_unknown);
+        let unknown = position(&self.hardware, Subject::Unknown);
         let mut p = [0.0; DECISION_STATES];
         for (at, of) in hardware.iter().enumerate() {
             p[self.explanation(at)] += of;

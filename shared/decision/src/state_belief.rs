@@ -120,7 +120,8 @@ pub(crate) fn distance(one: &[f64], other: &[f64]) -> f64 {
     0.5 * differences.sum::<f64>()
 }
 
-fn position(states: &[StateMeaning], subject: Subject) -> Option<usize> {
+/// The settled state of a subject that has only one.
+pub(crate) fn position(states: &[StateMeaning], subject: Subject) -> Option<usize> {
     let is_it = |meaning: &StateMeaning| meaning.subject == subject && meaning.settles_to.is_none();
     states.iter().position(is_it)
 }

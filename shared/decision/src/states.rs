@@ -103,16 +103,19 @@ pub(crate) fn leaves(tree: &FaultTree, robot: &Description) -> Vec<Leaf> {
 /// True if a state may have this name because of what it says about the hardware.
 pub(crate) fn is_of_hardware(name: &str, tree: &FaultTree) -> bool {
     let settled = name.strip_suffix(NEW).unwrap_or(name);
-    let names = |leaf| {
-        let mut of_leaf = tree.state_names(leaf);
-        of_leaf.any(|of_leaf| of_leaf == name || of_leaf == settled)
-    };
     matches!(settled, UNKNOWN | FAULT | SEVERAL | DRIVABLE)
         || tree
             .nodes()
             .first()
             .is_some_and(|nominal| nominal.name == settled)
-        || tree.leaves().any(names)
+        || is_of_leaves(name, tree)
+        || is_of_leaves(settled, tree)
+}
+
+/// True if a state of some leaves may have this name.
+fn is_of_leaves(name: &str, tree: &FaultTree) -> bool {
+    let names = |leaf| tree.state_names(leaf).any(|of_leaf| of_leaf == name);
+    tree.leaves().any(names)
 }
 
 /// Meaning of every state, by its name.
@@ -139,11 +142,7 @@ pub(crate) fn states(
     };
     let mut meanings: Vec<StateMeaning> = names.iter().map(meaning).collect();
     let is_there = |name: &&str| names.iter().any(|state| state == name);
-    let is_leaf = |name: &str| {
-        let names = |leaf| tree.state_names(leaf).any(|of_leaf| of_leaf == name);
-        tree.leaves().any(names)
-    };
-    let settled = names.iter().filter(|name| !is_leaf(name));
+    let settled = names.iter().filter(|name| !is_of_leaves(name, tree));
     let settled = settled.filter_map(|name| name.strip_suffix(NEW));
     let mut needed = [nominal, UNKNOWN].into_iter().chain(settled);
     if let Some(missing) = needed.find(|name| !is_there(name)) {

@@ -180,19 +180,16 @@ impl Model<'_> {
         let several = self.parameters.several;
         let sum: f64 = self.states.iter().map(|it| self.arises_1_h(it)).sum();
         let share = |state: &State<'_>| match state.condition {
-            _ if !state.is_new => 0.0,
-            Condition::Nominal => 1.0 - faulty,
-            _ if sum <= 0.0 => 0.0,
+            _ if !state.is_new || sum <= 0.0 => 0.0,
             Condition::Several => faulty * several.at_an_alarm * (1.0 - self.drivable()),
             Condition::Drivable(_) => faulty * several.at_an_alarm * self.drivable(),
             _ => faulty * (1.0 - several.at_an_alarm) * self.arises_1_h(state) / sum,
         };
         let mut start: Vec<f64> = self.states.iter().map(share).collect();
-        // Where nothing arises, nothing is wrong.
-        let rest = 1.0 - start.iter().sum::<f64>();
+        let nominal_p = 1.0 - start.iter().sum::<f64>();
         let is_nominal = |it: &State<'_>| it.is_new && matches!(it.condition, Condition::Nominal);
         if let Some(nominal) = self.states.iter().position(is_nominal) {
-            start[nominal] += rest;
+            start[nominal] = nominal_p;
         }
         start
     }
