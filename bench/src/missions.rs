@@ -20,6 +20,7 @@ mod order;
 mod pilot;
 mod plan;
 mod prices;
+mod recording;
 mod report;
 mod rules;
 mod score;
@@ -29,7 +30,7 @@ mod told;
 
 pub use breakdown::{Breakdown, Cause, PresentFault, drawn_wheel, encoder, stuck};
 pub use commander::Arm;
-pub use drive::{Mission, drive};
+pub use drive::{Mission, drive, record};
 pub use explanation::Explanations;
 pub use kind::Kind;
 pub use order::{action_block, order};

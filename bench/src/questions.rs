@@ -18,6 +18,9 @@ pub mod solver;
 pub mod taped_wheels;
 
 use std::error::Error;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -26,6 +29,8 @@ use vigil_bench::archive::Archive;
 use vigil_bench::machine;
 use vigil_bench::variation::{Comparison, say_comparisons, without_lead};
 use vigil_evaluation::parallel::in_parallel;
+use vigil_missions::learning::{Record, file};
+use vigil_pomdp::Pomdp;
 
 /// Missions between two lines of progress.
 const PROGRESS: usize = 100;
@@ -125,6 +130,21 @@ fn drive_all<P: Sync, M: Send>(
     };
     let missions: Result<Vec<M>, String> = in_parallel(plans, drive).into_iter().collect();
     Ok(missions?)
+}
+
+/// Writes the steps of a decision model in missions, as `vigil pomdp fit` and `learn` read them.
+fn write_records(
+    path: &Path,
+    policy: String,
+    model: &Pomdp,
+    records: &[Record],
+) -> Result<(), Box<dyn Error>> {
+    let mut out = BufWriter::new(File::create(path)?);
+    file::write_head(&mut out, policy)?;
+    for record in records {
+        file::write(&mut out, model, record)?;
+    }
+    Ok(out.flush()?)
 }
 
 /// Refuses to have missed bars.

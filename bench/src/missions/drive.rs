@@ -2,7 +2,8 @@
 
 use std::error::Error;
 
-use vigil_blocks::{RecoveryKind, SensorFrame};
+use vigil_blocks::{Action, RecoveryKind, SensorFrame};
+use vigil_missions::learning::Record;
 use vigil_robot::injection::Change;
 use vigil_sensor_sim::{ActionGate, World};
 
@@ -11,6 +12,7 @@ use super::commander::{Arm, Commander};
 use super::order::order;
 use super::pilot::Pilot;
 use super::plan::Plan;
+use super::recording::EvidenceRecorder;
 use super::rules::RuleOutput;
 use super::score::{Score, Step, Tally};
 use super::told::{self, Knowledge};
@@ -30,7 +32,10 @@ pub struct Mission {
 /// # Errors
 /// A world or commander that cannot be made.
 pub fn drive(shipped: &ShippedGraph, plan: &Plan, arms: &[Arm]) -> Result<Mission, Box<dyn Error>> {
-    let scores: Result<_, _> = arms.iter().map(|arm| ride(shipped, plan, *arm)).collect();
+    let scores: Result<_, _> = arms
+        .iter()
+        .map(|arm| ride(shipped, plan, *arm, &mut |_, _, _| {}))
+        .collect();
     Ok(Mission {
         plan: plan.clone(),
         scores: scores?,
@@ -122,11 +127,30 @@ impl<'a> Field<'a> {
     }
 }
 
-/// Drives a mission with one commander.
+/// Drives a mission with Vigil, and records the evidence of each epoch with what was true in it.
+///
+/// # Errors
+/// As [`drive`].
+pub fn record(shipped: &ShippedGraph, plan: &Plan) -> Result<Vec<Record>, Box<dyn Error>> {
+    let epoch_s = shipped.setup.file.supervisor.epoch_ms * 1e-3;
+    let mut recorder = EvidenceRecorder::new(&shipped.setup.decision, epoch_s);
+    ride(shipped, plan, Arm::Vigil, &mut |t_ns, faults, action| {
+        recorder.take(t_ns, faults, action);
+    })?;
+    Ok(recorder.finish())
+}
+
+/// Drives a mission with one commander; `watch` is shown the time of each frame in ns, what
+/// is wrong, and the action block.
 ///
 /// # Errors
 /// A world or commander that cannot be made.
-fn ride(shipped: &ShippedGraph, plan: &Plan, arm: Arm) -> Result<Score, Box<dyn Error>> {
+fn ride(
+    shipped: &ShippedGraph,
+    plan: &Plan,
+    arm: Arm,
+    watch: &mut dyn FnMut(u64, &[PresentFault], &Action),
+) -> Result<Score, Box<dyn Error>> {
     let rate_hz = shipped.setup.file.graph.rate_hz;
     let (dt_s, period_ns) = (1.0 / rate_hz, (1e9 / rate_hz).round() as u64);
     let prices = &shipped.missions.prices;
@@ -145,6 +169,7 @@ fn ride(shipped: &ShippedGraph, plan: &Plan, arm: Arm) -> Result<Score, Box<dyn 
         let knowledge = field.knowledge();
         let action = commander.command(&frame, &knowledge, dt_s);
         let obeyed = order(action);
+        watch(frame.header.t_capture_ns, field.present(), action);
         let (planned, before) = (field.pilot.command(), field.world.true_state().pose);
         let command = gate.apply(planned, Some(action), frame.header.t_capture_ns);
         field.break_what_is_due(dt_s)?;

@@ -3,8 +3,6 @@
 //! Exit: 1 if a bar is missed.
 
 use std::error::Error;
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -12,9 +10,8 @@ use serde_json::json;
 use vigil_bench::corridors::{self, CorridorArm, CorridorGraph, CorridorPlan, EscalationSettings};
 use vigil_bench::tuning::tune;
 use vigil_bench::variation::Variation;
-use vigil_missions::learning::file;
 
-use super::{MissionArgs, demand_none, drive_all};
+use super::{MissionArgs, demand_none, drive_all, write_records};
 
 /// Which missions.
 #[derive(Debug, clap::Args)]
@@ -98,16 +95,11 @@ fn record(
     path: &Path,
 ) -> Result<(), Box<dyn Error>> {
     let records = drive_all(plans, |plan| corridors::record(graph, plan, args.tried))?;
-    let mut out = BufWriter::new(File::create(path)?);
     let policy = format!(
         "{}, {} tried",
         graph.setup.file.supervisor.policy, args.tried
     );
-    file::write_head(&mut out, policy)?;
-    for record in &records {
-        file::write(&mut out, &graph.setup.decision, record)?;
-    }
-    Ok(out.flush()?)
+    write_records(path, policy, &graph.setup.decision, &records)
 }
 
 fn sweep(args: &Args, graph: &CorridorGraph, plans: &[CorridorPlan]) -> Result<(), Box<dyn Error>> {

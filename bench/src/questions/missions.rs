@@ -12,7 +12,7 @@ use vigil_bench::missions::{self, Arm, Plan, Rule, Rules, ShippedGraph};
 use vigil_bench::tuning::tune;
 use vigil_bench::variation::Variation;
 
-use super::{MissionArgs, demand_none, drive_all};
+use super::{MissionArgs, demand_none, drive_all, write_records};
 
 /// Which missions.
 #[derive(Debug, clap::Args)]
@@ -23,6 +23,10 @@ pub struct Args {
     /// Graph of Vigil; of `config/` if the path is relative.
     #[arg(long, value_name = "F", default_value = "rover.toml")]
     config: PathBuf,
+    /// Drive Vigil alone, and write the evidence of its decisions with what was true to this file,
+    /// for `vigil pomdp fit`.
+    #[arg(long, value_name = "F", conflicts_with_all = ["sweep", "vary", "json"])]
+    record: Option<PathBuf>,
     #[command(flatten)]
     common: MissionArgs,
 }
@@ -37,6 +41,11 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     }
     let shipped = ShippedGraph::read(&args.config, Variation::default())?;
     let plans = shipped.plans(args.per_kind, args.common.first_seed());
+    if let Some(path) = &args.record {
+        let records = drive_all(&plans, |plan| missions::record(&shipped, plan))?.concat();
+        let policy = shipped.setup.file.supervisor.policy.clone();
+        return write_records(path, policy, &shipped.setup.decision, &records);
+    }
     match args.common.sweep {
         true => sweep(args, &shipped, &plans),
         false => measure(args, &shipped, &plans),

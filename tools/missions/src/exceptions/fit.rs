@@ -1,8 +1,6 @@
 //! Parameters from recorded missions whose states are known.
 //!
-//! Each number is a chance, and is counted: k of n visits. The parameters made by hand count as K
-//! visits: the fitted chance is (k + K p) / (n + K), the mean of a beta distribution. A chance that
-//! is 0 by hand is ruled out and stays so.
+//! Each number is a chance, and is counted.
 //!
 //! - *Transitions*: kind by kind, as the kinds are independent. What arises and passes by itself is
 //!   counted under the actions that follow the path for a whole step; what an action mends is what
@@ -14,39 +12,11 @@
 
 use std::collections::BTreeMap;
 
-use statrs::distribution::{Beta, ContinuousCDF};
 use vigil_pomdp::Pomdp;
 
 use super::parameters::{Action, Exception, Parameters, Signs};
+use crate::counting::{Count, Fit, FittedChances};
 use crate::learning::Record;
-
-/// A number that was fitted.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct FittedChance {
-    /// Where it stands in the file.
-    pub key: String,
-    /// What it was.
-    pub by_hand: f64,
-    /// What it is.
-    pub fitted: f64,
-    /// Bounds of its 95 % credible interval.
-    pub interval: [f64; 2],
-    /// How often it was so.
-    pub count: f64,
-    /// How often it might have been.
-    pub visits: f64,
-}
-
-/// Fitted parameters, and where each number comes from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fit {
-    /// The parameters.
-    pub parameters: Parameters,
-    /// Numbers that were visited, in the order of the file.
-    pub chances: Vec<FittedChance>,
-    /// Steps between known states.
-    pub steps: usize,
-}
 
 /// A step between two known states.
 struct Step<'a> {
@@ -88,61 +58,13 @@ fn of_kind<'a>(set: &[&'a Exception], kind: &str) -> Option<&'a str> {
     of_kind.map(|e| e.name.as_str())
 }
 
-/// k of n visits.
-#[derive(Debug, Clone, Copy, Default)]
-struct Count {
-    k: f64,
-    n: f64,
-}
-
-impl Count {
-    /// Of the steps for which `is_visit` holds, those for which `is_so` does.
-    fn among(
-        steps: &[Step<'_>],
-        is_visit: impl Fn(&Step<'_>) -> bool,
-        is_so: impl Fn(&Step<'_>) -> bool,
-    ) -> Self {
-        let visits: Vec<&Step<'_>> = steps.iter().filter(|step| is_visit(step)).collect();
-        Self {
-            k: visits.iter().filter(|step| is_so(step)).count() as f64,
-            n: visits.len() as f64,
-        }
-    }
-}
-
 /// The fit as it grows.
 struct Fitter<'a> {
     steps: &'a [Step<'a>],
-    weight: f64,
-    chances: Vec<FittedChance>,
+    chances: FittedChances,
 }
 
 impl Fitter<'_> {
-    /// Sets a chance that is not ruled out to what the counts make of it.
-    fn set(&mut self, key: String, chance: &mut f64, count: Count) {
-        let by_hand = *chance;
-        if by_hand <= 0.0 || count.n == 0.0 {
-            return;
-        }
-        let (yes, no) = (
-            count.k + self.weight * by_hand,
-            count.n - count.k + self.weight * (1.0 - by_hand),
-        );
-        *chance = yes / (yes + no);
-        let bound = |p| match Beta::new(yes, no) {
-            Ok(beta) => beta.inverse_cdf(p),
-            Err(_) => *chance,
-        };
-        self.chances.push(FittedChance {
-            key,
-            by_hand,
-            fitted: *chance,
-            interval: [bound(0.025), bound(0.975)],
-            count: count.k,
-            visits: count.n,
-        });
-    }
-
     fn signs(&mut self, signs: &mut Signs, exception: Option<&str>) {
         let key = |of: &str, name: &str| format!("{}: {of} {name}", exception.unwrap_or("nominal"));
         let steps = self.steps;
@@ -150,13 +72,13 @@ impl Fitter<'_> {
             let is_visit =
                 |step: &Step<'_>| step.shows_alone(exception) && step.action.shows == 1.0;
             let count = Count::among(steps, is_visit, |step| step.sees(name));
-            self.set(key("symptom", name), p, count);
+            self.chances.set(key("symptom", name), p, count);
         }
         for (name, p) in &mut signs.outcomes {
             let is_visit =
                 |step: &Step<'_>| step.shows_alone(exception) && step.action.reports.contains(name);
             let count = Count::among(steps, is_visit, |step| step.sees(name));
-            self.set(key("outcome", name), p, count);
+            self.chances.set(key("outcome", name), p, count);
         }
     }
 
@@ -165,7 +87,7 @@ impl Fitter<'_> {
         let is_visit = |step: &Step<'_>| step.before(kind).is_none() && step.is_whole();
         let count = Count::among(self.steps, is_visit, |step| step.after(kind) == Some(name));
         let key = format!("{name}: arises");
-        self.set(key, &mut exception.arises, count);
+        self.chances.set(key, &mut exception.arises, count);
     }
 
     fn passes(&mut self, exception: &mut Exception) {
@@ -178,7 +100,7 @@ impl Fitter<'_> {
         };
         let count = Count::among(self.steps, is_visit, |step| step.after(kind).is_none());
         let key = format!("{name}: passes");
-        self.set(key, &mut exception.passes, count);
+        self.chances.set(key, &mut exception.passes, count);
     }
 
     /// What is gone has passed or was mended: 1 - (1 - mended) (1 - passes).
@@ -194,7 +116,7 @@ impl Fitter<'_> {
             let n = gone.n * (1.0 - passes);
             let k = (gone.k - gone.n * passes).clamp(0.0, n);
             let key = format!("{name}: mended by {action}");
-            self.set(key, mended, Count { k, n });
+            self.chances.set(key, mended, Count { k, n });
         }
     }
 
@@ -216,7 +138,7 @@ impl Fitter<'_> {
                 let is_so = |step: &Step<'_>| step.after(kind) == Some(other.as_str());
                 let count = Count::among(self.steps, is_visit, is_so);
                 let key = format!("{name}: turned into {other} by {action}");
-                self.set(key, p, count);
+                self.chances.set(key, p, count);
             }
         }
     }
@@ -248,13 +170,18 @@ impl Fitter<'_> {
             n: to_expect,
         };
         let key = format!("{}: shows", action.name);
-        self.set(key, &mut action.shows, count);
+        self.chances.set(key, &mut action.shows, count);
     }
 }
 
 /// Fits checked parameters to records of the model that they make; `weight` is K.
 #[must_use]
-pub fn fit(parameters: &Parameters, model: &Pomdp, records: &[Record], weight: f64) -> Fit {
+pub fn fit(
+    parameters: &Parameters,
+    model: &Pomdp,
+    records: &[Record],
+    weight: f64,
+) -> Fit<Parameters> {
     let steps: Vec<Step<'_>> = records
         .iter()
         .flat_map(|record| steps(parameters, model, record))
@@ -262,8 +189,7 @@ pub fn fit(parameters: &Parameters, model: &Pomdp, records: &[Record], weight: f
     let mut fitted = parameters.clone();
     let mut fitter = Fitter {
         steps: &steps,
-        weight,
-        chances: Vec::new(),
+        chances: FittedChances::new(weight),
     };
     fitter.signs(&mut fitted.nominal, None);
     for exception in &mut fitted.exceptions {
@@ -280,7 +206,7 @@ pub fn fit(parameters: &Parameters, model: &Pomdp, records: &[Record], weight: f
         fitter.shows(action, &expected, &fitted.nominal);
     }
     Fit {
-        chances: fitter.chances,
+        chances: fitter.chances.finish(),
         steps: steps.len(),
         parameters: fitted,
     }

@@ -13,7 +13,7 @@ mod fit;
 mod parameters;
 mod process;
 
-pub use fit::{Fit, FittedChance, fit};
+pub use fit::fit;
 pub use parameters::{Action, Exception, ParameterError, Parameters, Signs};
 pub use process::{ExceptionProcess, NOMINAL};
 

@@ -18,8 +18,10 @@
 //!
 //! [`generate`] writes the model in Cassandra's format.
 
+mod fit;
 mod generator;
 mod parameters;
 
+pub use fit::fit;
 pub use generator::generate;
 pub use parameters::{ActionParameters, ParameterError, Parameters};

@@ -1,6 +1,6 @@
 //! The parameter file of the recovery model.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Name of the state of several faults with which a robot can be driven home.
 pub(super) const DRIVABLE: &str = "SEVERAL_DRIVABLE";
@@ -10,7 +10,7 @@ pub(super) const NEW: &str = "_NEW";
 
 /// Everything that the model is made from. Prices are in units of the
 /// user's choice, the same for all.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
     /// What the file is for: `recovery`.
@@ -36,7 +36,7 @@ pub struct Parameters {
 }
 
 /// What the robot has to do.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Task {
     /// Usual speed, m/s.
@@ -48,7 +48,7 @@ pub struct Task {
 }
 
 /// Help.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Help {
     /// Name of the action.
@@ -60,7 +60,7 @@ pub struct Help {
 }
 
 /// Something that the robot can do.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActionParameters {
     /// Its name.
@@ -70,6 +70,7 @@ pub struct ActionParameters {
     /// Chance that a step's evidence speaks for the truth, 0 to 1.
     pub sees: f64,
     /// The faults that it answers, by their `state`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub remedies: Option<String>,
     /// Price of a metre where there is none of these.
     #[serde(default)]
@@ -77,7 +78,7 @@ pub struct ActionParameters {
 }
 
 /// Faults that have one state: what is done about one is done about each of them.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
     /// Name of the state: that of a leaf of the fault tree, of a node above leaves, or of a kind of
@@ -90,11 +91,12 @@ pub struct Fault {
     /// Price of a metre at full speed; at less the less.
     pub price_1_m: f64,
     /// Price of a metre where it is answered, whatever the speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub remedied_1_m: Option<f64>,
 }
 
 /// Two faults or more.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Several {
     /// How often another fault joins one, 1/s.
@@ -104,11 +106,12 @@ pub struct Several {
     /// Price of a metre at full speed.
     pub price_1_m: f64,
     /// Those with which a robot can be driven home.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub drivable: Option<Drivable>,
 }
 
 /// Two faults or more with which a robot can be driven home: the state `SEVERAL_DRIVABLE`.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drivable {
     /// Their share of the faults that join one, 0 to 1.
@@ -118,7 +121,7 @@ pub struct Drivable {
 }
 
 /// What nothing explains.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Unknown {
     /// How often it arises, 1/h.
@@ -132,7 +135,7 @@ pub struct Unknown {
 }
 
 /// What a step's evidence speaks for.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Evidence {
     /// Chance that it speaks for a wrong state, as a share of that for the true one.

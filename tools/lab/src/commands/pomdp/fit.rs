@@ -1,14 +1,16 @@
-//! `vigil pomdp fit`: parameters of a model of exceptions from recorded missions.
+//! `vigil pomdp fit`: parameters of a model from recorded missions.
 
-use std::fs;
+use std::fmt::Display;
 use std::path::PathBuf;
 
 use serde::Serialize;
-use vigil_missions::exceptions::{self, Fit, FittedChance, Parameters};
-use vigil_missions::learning::file;
+use serde::de::DeserializeOwned;
+use vigil_missions::learning::{Record, file};
+use vigil_missions::{Fit, FittedChance, exceptions, recovery};
 use vigil_pomdp::Pomdp;
 use vigil_terminal::{CommandError, Outcome};
 
+use super::parameters::{ModelKind, ParameterFile};
 use super::{print, save};
 
 /// Fits the chances of a file of parameters to missions whose true states are recorded.
@@ -17,7 +19,8 @@ use super::{print, save};
 /// mission shows, and what the file rules out with a 0, stays as it is; so do rewards and prices.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Parameters of a model of exceptions, such as config/corridor.recovery.toml.
+    /// Parameters of a model of exceptions or of recovery, such as config/corridor.recovery.toml
+    /// or config/rover.recovery.toml.
     parameters: PathBuf,
     /// Missions with states (JSON lines, see `vigil pomdp simulate`).
     #[arg(long, value_name = "F")]
@@ -49,26 +52,39 @@ struct Document {
 /// # Errors
 /// Files and options that are refused; a file that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let name = args.parameters.display();
-    let refused = |error: &dyn std::fmt::Display| CommandError::usage(format!("{name}: {error}"));
-    let text = fs::read_to_string(&args.parameters).map_err(|e| refused(&e))?;
-    let parameters: Parameters = toml::from_str(&text).map_err(|e| refused(&e))?;
-    let model = exceptions::generate(&parameters).map_err(|e| refused(&e))?;
-    let model = Pomdp::parse(&model).map_err(|e| refused(&e))?;
+    let file = ParameterFile::read(&args.parameters)?;
+    match file.model {
+        ModelKind::Exceptions => run_for(args, &file, exceptions::generate, exceptions::fit),
+        ModelKind::Recovery => run_for(args, &file, recovery::generate, recovery::fit),
+        ModelKind::Navigation => Err(file.refused(
+            &"nothing counts the paper's navigation: allowed are models of exceptions and recovery",
+        )),
+    }
+}
+
+fn run_for<P: DeserializeOwned + Serialize, E: Display>(
+    args: &Args,
+    file: &ParameterFile,
+    generate: impl Fn(&P) -> Result<String, E>,
+    fit: impl Fn(&P, &Pomdp, &[Record], f64) -> Fit<P>,
+) -> Result<Outcome, CommandError> {
+    let parameters: P = file.parsed()?;
+    let model = generate(&parameters).map_err(|e| file.refused(&e))?;
+    let model = Pomdp::parse(&model).map_err(|e| file.refused(&e))?;
     let flown = file::read(&args.missions, &model).map_err(CommandError::usage)?;
     let Fit {
         parameters,
         chances,
         steps,
-    } = exceptions::fit(&parameters, &model, &flown.records, args.prior_strength);
+    } = fit(&parameters, &model, &flown.records, args.prior_strength);
     if steps == 0 {
         let missions = args.missions.display();
-        let problem = "no step between two known states: allowed are missions with 'states'";
+        let problem = "no step to a known state: allowed are missions with 'states'";
         return Err(CommandError::usage(format!("{missions}: {problem}")));
     }
     let document = Document {
         schema_version: 1,
-        parameters_file: name.to_string(),
+        parameters_file: args.parameters.display().to_string(),
         missions_file: args.missions.display().to_string(),
         missions: flown.records.len(),
         steps,
@@ -88,7 +104,7 @@ fn text_of(document: &Document) -> String {
     let width = width.unwrap_or(0);
     let mut lines = vec![
         format!(
-            "{} missions, {} steps between known states",
+            "{} missions, {} steps to known states",
             document.missions, document.steps
         ),
         format!("{:width$}  by hand  fitted  95 %            counted", ""),

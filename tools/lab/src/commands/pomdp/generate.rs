@@ -1,13 +1,10 @@
 //! `vigil pomdp generate`: a model from its parameters, of exceptions, of navigation or of faults.
 
-use std::fmt::Display;
-use std::fs;
 use std::path::PathBuf;
 
-use serde::Deserialize;
-use serde::de::DeserializeOwned;
 use vigil_missions::{exceptions, navigation, recovery};
 
+use super::parameters::{ModelKind, ParameterFile};
 use super::save;
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
@@ -23,36 +20,21 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
-/// What a file of parameters is for.
-#[derive(Deserialize)]
-struct Purpose {
-    model: Model,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum Model {
-    Exceptions,
-    Navigation,
-    Recovery,
-}
-
 /// Runs the command.
 ///
 /// # Errors
 /// A file that cannot be read or written, a parameter that means nothing.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let text = fs::read_to_string(&args.parameters)
-        .map_err(|error| refused(args, &format!("cannot be read: {error}")))?;
-    let model = match read::<Purpose>(args, &text)?.model {
-        Model::Exceptions => {
-            exceptions::generate(&read(args, &text)?).map_err(|error| refused(args, &error))?
+    let file = ParameterFile::read(&args.parameters)?;
+    let model = match file.model {
+        ModelKind::Exceptions => {
+            exceptions::generate(&file.parsed()?).map_err(|error| file.refused(&error))?
         }
-        Model::Navigation => {
-            navigation::generate(&read(args, &text)?).map_err(|error| refused(args, &error))?
+        ModelKind::Navigation => {
+            navigation::generate(&file.parsed()?).map_err(|error| file.refused(&error))?
         }
-        Model::Recovery => {
-            recovery::generate(&read(args, &text)?).map_err(|error| refused(args, &error))?
+        ModelKind::Recovery => {
+            recovery::generate(&file.parsed()?).map_err(|error| file.refused(&error))?
         }
     };
     match &args.out {
@@ -60,12 +42,4 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         None => output::line(model.trim_end()).map_err(CommandError::failure)?,
     }
     Ok(Outcome::Done)
-}
-
-fn refused(args: &Args, error: &dyn Display) -> CommandError {
-    CommandError::usage(format!("{}: {error}", args.parameters.display()))
-}
-
-fn read<T: DeserializeOwned>(args: &Args, text: &str) -> Result<T, CommandError> {
-    toml::from_str(text).map_err(|error| refused(args, &error))
 }

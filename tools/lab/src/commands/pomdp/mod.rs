@@ -8,6 +8,7 @@ mod generate;
 mod info;
 mod learn;
 mod missions;
+mod parameters;
 mod picture;
 mod planner;
 mod seed;

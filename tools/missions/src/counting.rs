@@ -1,0 +1,101 @@
+//! Chances that are counted, with what was thought before.
+//!
+//! A chance p made by hand counts as K visits: after k of n it is (k + K p) / (n + K), the mean of
+//! a beta distribution (Gelman et al., *Bayesian Data Analysis*, section 2.4). A chance that is 0
+//! by hand is ruled out and stays so.
+
+use statrs::distribution::{Beta, ContinuousCDF};
+
+/// A number that was fitted.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct FittedChance {
+    /// Where it stands in the file.
+    pub key: String,
+    /// What it was.
+    pub by_hand: f64,
+    /// What it is.
+    pub fitted: f64,
+    /// Bounds of its 95 % credible interval.
+    pub interval: [f64; 2],
+    /// How often it was so.
+    pub count: f64,
+    /// How often it might have been.
+    pub visits: f64,
+}
+
+/// Fitted parameters, and where each number comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit<P> {
+    /// The parameters.
+    pub parameters: P,
+    /// Numbers that were visited, in the order of the file.
+    pub chances: Vec<FittedChance>,
+    /// Steps that told something.
+    pub steps: usize,
+}
+
+/// k of n visits.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Count {
+    pub k: f64,
+    pub n: f64,
+}
+
+impl Count {
+    /// Of the steps for which `is_visit` holds, those for which `is_so` does.
+    pub(crate) fn among<S>(
+        steps: &[S],
+        is_visit: impl Fn(&S) -> bool,
+        is_so: impl Fn(&S) -> bool,
+    ) -> Self {
+        let visits: Vec<&S> = steps.iter().filter(|step| is_visit(step)).collect();
+        Self {
+            k: visits.iter().filter(|step| is_so(step)).count() as f64,
+            n: visits.len() as f64,
+        }
+    }
+}
+
+/// Chances as they are fitted, by a weight K of what was thought before.
+pub(crate) struct FittedChances {
+    weight: f64,
+    chances: Vec<FittedChance>,
+}
+
+impl FittedChances {
+    pub(crate) const fn new(weight: f64) -> Self {
+        Self {
+            weight,
+            chances: Vec::new(),
+        }
+    }
+
+    /// Sets a chance that is not ruled out to what the counts make of it.
+    pub(crate) fn set(&mut self, key: String, chance: &mut f64, count: Count) {
+        let by_hand = *chance;
+        if by_hand <= 0.0 || count.n == 0.0 {
+            return;
+        }
+        let (yes, no) = (
+            count.k + self.weight * by_hand,
+            count.n - count.k + self.weight * (1.0 - by_hand),
+        );
+        *chance = yes / (yes + no);
+        let bound = |p| match Beta::new(yes, no) {
+            Ok(beta) => beta.inverse_cdf(p),
+            Err(_) => *chance,
+        };
+        self.chances.push(FittedChance {
+            key,
+            by_hand,
+            fitted: *chance,
+            interval: [bound(0.025), bound(0.975)],
+            count: count.k,
+            visits: count.n,
+        });
+    }
+
+    pub(crate) fn finish(self) -> Vec<FittedChance> {
+        self.chances
+    }
+}
