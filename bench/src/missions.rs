@@ -15,6 +15,7 @@ mod breakdown;
 mod commander;
 mod drive;
 mod explanation;
+mod explorer;
 mod kind;
 mod order;
 mod pilot;

@@ -147,6 +147,13 @@ fn write_records(
     Ok(out.flush()?)
 }
 
+/// A number from 0 to 1.
+fn share(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    let number = number.filter(|share| (0.0..=1.0).contains(share));
+    number.ok_or_else(|| "allowed is a number from 0 to 1".to_owned())
+}
+
 /// Refuses to have missed bars.
 fn demand_none(missed: &[String]) -> Result<(), Box<dyn Error>> {
     match missed.len() {

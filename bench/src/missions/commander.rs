@@ -7,6 +7,7 @@ use vigil_evaluation::stages::Stages;
 
 use super::ShippedGraph;
 use super::explanation::Explanations;
+use super::explorer::Explorer;
 use super::order::action_block;
 use super::rules::{Follower, Rule, RuleOutput};
 use super::told::{self, Knowledge};
@@ -17,6 +18,8 @@ use crate::simulated;
 pub enum Arm {
     /// Detector, identifier and supervisor as they ship.
     Vigil,
+    /// The same, which after this share of the alarms tries something else.
+    Explorer(f64),
     /// Rules over detector and identifier.
     Rule(Rule),
     /// As Vigil, with decisions by Q-MDP: of the same model, without what information is worth.
@@ -36,6 +39,7 @@ impl Arm {
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Vigil => "Vigil",
+            Self::Explorer(_) => "explorer",
             Self::Rule(rule) => rule.name(),
             Self::Heuristic => "Q-MDP",
             Self::Without => "without",
@@ -54,7 +58,7 @@ pub(super) struct Commander<'a> {
 }
 
 enum Mind {
-    Vigil(Box<Stages>),
+    Vigil(Box<Stages>, Option<Explorer>),
     Rule(Box<Stages>, Rule, Follower),
     Without,
     Told,
@@ -73,8 +77,12 @@ impl<'a> Commander<'a> {
         let of = |setup| simulated::stages(setup, sensors, rate_hz, seed).map(Box::new);
         let stages = || of(&shipped.setup);
         let mind = match arm {
-            Arm::Vigil => Mind::Vigil(stages()?),
-            Arm::Heuristic => Mind::Vigil(of(&shipped.heuristic)?),
+            Arm::Vigil => Mind::Vigil(stages()?, None),
+            Arm::Explorer(share) => {
+                let explorer = Explorer::new(&shipped.setup, share, seed);
+                Mind::Vigil(stages()?, Some(explorer))
+            }
+            Arm::Heuristic => Mind::Vigil(of(&shipped.heuristic)?, None),
             Arm::Rule(rule) => Mind::Rule(stages()?, rule, Follower::new(rule)),
             Arm::Without => Mind::Without,
             Arm::Told => Mind::Told,
@@ -96,9 +104,12 @@ impl<'a> Commander<'a> {
         dt_s: f64,
     ) -> &Action {
         let output = match &mut self.mind {
-            Mind::Vigil(stages) => {
+            Mind::Vigil(stages, explorer) => {
                 stages.take(frame);
                 *self.action = *stages.action();
+                if let Some(explorer) = explorer {
+                    explorer.change(&mut self.action, dt_s);
+                }
                 return &self.action;
             }
             Mind::Rule(stages, _, follower) => {
@@ -126,7 +137,7 @@ impl<'a> Commander<'a> {
         match &mut self.mind {
             Mind::Rule(_, rule, follower) => *follower = Follower::new(*rule),
             Mind::ToldAtAlarm(_, is_told) => *is_told = false,
-            Mind::Vigil(_) | Mind::Without | Mind::Told => {}
+            Mind::Vigil(..) | Mind::Without | Mind::Told => {}
         }
     }
 }

@@ -127,14 +127,20 @@ impl<'a> Field<'a> {
     }
 }
 
-/// Drives a mission with Vigil, and records the evidence of each epoch with what was true in it.
+/// Drives a mission with Vigil, which after a share of the alarms tries something else, and records
+/// the evidence of each epoch with what was true in it.
 ///
 /// # Errors
 /// As [`drive`].
-pub fn record(shipped: &ShippedGraph, plan: &Plan) -> Result<Vec<Record>, Box<dyn Error>> {
+pub fn record(
+    shipped: &ShippedGraph,
+    plan: &Plan,
+    tried_share: f64,
+) -> Result<Vec<Record>, Box<dyn Error>> {
     let epoch_s = shipped.setup.file.supervisor.epoch_ms * 1e-3;
     let mut recorder = EvidenceRecorder::new(&shipped.setup.decision, epoch_s);
-    ride(shipped, plan, Arm::Vigil, &mut |t_ns, faults, action| {
+    let arm = Arm::Explorer(tried_share);
+    ride(shipped, plan, arm, &mut |t_ns, faults, action| {
         recorder.take(t_ns, faults, action);
     })?;
     Ok(recorder.finish())

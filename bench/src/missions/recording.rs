@@ -3,7 +3,11 @@
 //! The decision model's observation of an epoch is what its evidence speaks for most: the condition
 //! whose probability rose most, if the belief moved at all. A condition counts as new from when it
 //! is there, or from the alarm, until nothing has been said of it for [`QUIET_S`]; then it has
-//! settled. What is said later, the model holds impossible: such a step has no true state.
+//! settled. What is said later, the model holds impossible: such a step has no true state. Nor has
+//! one in which no alarm stands, or rises: before it the model has not begun.
+//!
+//! So what is new is what more will be said of. Who waits cannot know that: chances that are
+//! counted by it, of evidence and of its end, are a tenth too high in the rover's missions.
 
 use vigil_blocks::{Action, RecoveryKind};
 use vigil_missions::learning::Record;
@@ -26,10 +30,19 @@ const NEW: &str = "_NEW";
 /// An epoch.
 struct EpochStep {
     action: u32,
-    /// Name of what was true at its end; `None` for what the model does not have.
+    /// Name of what was true at its end; `None` for what the model does not have, and while no
+    /// alarm stands.
     truth: Option<&'static str>,
     /// The condition that its evidence speaks for.
     said: Option<usize>,
+}
+
+/// The beginning of an epoch.
+struct EpochBegin {
+    t_ns: u64,
+    action: u32,
+    belief: Vec<f64>,
+    alarm: bool,
 }
 
 /// Follows the supervisor's action blocks from an alarm to a call for help.
@@ -38,8 +51,7 @@ pub(super) struct EvidenceRecorder<'a> {
     epoch_ns: u64,
     /// For each state, the settled one of the same condition.
     settled: Vec<usize>,
-    /// When the present epoch began, the action in it, and the belief at its beginning.
-    began: Option<(u64, u32, Vec<f64>)>,
+    began: Option<EpochBegin>,
     before: Option<&'static str>,
     steps: Vec<EpochStep>,
     records: Vec<Record>,
@@ -74,16 +86,22 @@ impl<'a> EvidenceRecorder<'a> {
             return;
         }
         let belief = self.folded(action);
+        let alarm = action.alarm != 0;
         match &self.began {
             None => self.before = truth(faults),
-            Some((began_ns, ..)) if t_ns < began_ns + self.epoch_ns => return,
-            Some((_, of, before)) => self.steps.push(EpochStep {
-                action: *of,
-                truth: truth(faults),
-                said: said(before, &belief),
+            Some(began) if t_ns < began.t_ns + self.epoch_ns => return,
+            Some(began) => self.steps.push(EpochStep {
+                action: began.action,
+                truth: truth(faults).filter(|_| began.alarm && alarm),
+                said: said(&began.belief, &belief),
             }),
         }
-        self.began = Some((t_ns, action.action, belief));
+        self.began = Some(EpochBegin {
+            t_ns,
+            action: action.action,
+            belief,
+            alarm,
+        });
     }
 
     /// What was recorded, one record for each alarm.
@@ -169,10 +187,14 @@ fn new_until(steps: &[EpochStep], quiet: usize) -> Vec<usize> {
 
 /// The condition whose probability has risen most, if the belief has moved.
 fn said(before: &[f64], after: &[f64]) -> Option<usize> {
-    let rises = before.iter().zip(after).map(|(before, after)| after - before);
+    let rises = before
+        .iter()
+        .zip(after)
+        .map(|(before, after)| after - before);
     let moved: f64 = rises.clone().filter(|rise| *rise > 0.0).sum();
     let most = rises.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
-    most.filter(|_| moved > MOVED).map(|(condition, _)| condition)
+    most.filter(|_| moved > MOVED)
+        .map(|(condition, _)| condition)
 }
 
 /// The model's name of what is wrong.
@@ -194,5 +216,115 @@ fn truth(faults: &[PresentFault]) -> Option<&'static str> {
                 None => "SEVERAL",
             })
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EPOCH_S: f64 = 0.1;
+
+    fn model() -> Pomdp {
+        let file = crate::root().join("config/rover.pomdp");
+        Pomdp::parse(&std::fs::read_to_string(file).unwrap()).unwrap()
+    }
+
+    /// A rover with a stuck wheel that goes on, with an alarm.
+    struct Rover<'a> {
+        recorder: EvidenceRecorder<'a>,
+        model: &'a Pomdp,
+        t_ns: u64,
+    }
+
+    impl Rover<'_> {
+        /// An epoch later these are its probabilities.
+        fn believes(&mut self, parts: &[(&str, f64)], alarm: bool, kind: RecoveryKind) {
+            let mut action = Action {
+                alarm: u32::from(alarm),
+                kind: kind as u32,
+                ..Action::default()
+            };
+            for (name, p) in parts {
+                let state = self.model.states().iter().position(|of| of == name);
+                action.belief[state.unwrap()] = *p;
+            }
+            let stuck = PresentFault {
+                cause: Cause::Stuck(0),
+                severity: 1.0,
+            };
+            self.recorder.take(self.t_ns, &[stuck], &action);
+            self.t_ns += (EPOCH_S * 1e9) as u64;
+        }
+    }
+
+    fn names(model: &Pomdp, record: &Record) -> Vec<(String, Option<String>)> {
+        let seen = record.observations.iter();
+        let seen = seen.map(|o| model.observations()[*o as usize].clone());
+        let labels = record.labels[1..].iter();
+        let labels = labels.map(|label| label.map(|s| model.states()[s as usize].clone()));
+        seen.zip(labels).collect()
+    }
+
+    #[test]
+    fn evidence_is_new_from_the_alarm_until_it_is_quiet() {
+        let model = model();
+        let mut rover = Rover {
+            recorder: EvidenceRecorder::new(&model, EPOCH_S),
+            model: &model,
+            t_ns: 0,
+        };
+        let go_on = RecoveryKind::GoOn;
+        rover.believes(&[("ND", 1.0)], false, go_on);
+        rover.believes(&[("UNKNOWN_NEW", 0.8), ("STUCK_NEW", 0.2)], true, go_on);
+        // Too little to be told anything; that something has settled is no evidence; then it is.
+        rover.believes(&[("UNKNOWN", 0.78), ("STUCK", 0.22)], true, go_on);
+        rover.believes(&[("UNKNOWN_NEW", 0.1), ("STUCK_NEW", 0.9)], true, go_on);
+        for _ in 0..20 {
+            rover.believes(&[("UNKNOWN", 0.1), ("STUCK", 0.9)], true, go_on);
+        }
+        // Late news, which the model holds impossible.
+        rover.believes(&[("UNKNOWN", 0.9), ("STUCK", 0.1)], true, go_on);
+        rover.believes(&[("UNKNOWN", 0.9)], true, RecoveryKind::CallForHelp);
+        let records = rover.recorder.finish();
+        let [record] = records.as_slice() else {
+            panic!("{records:?}");
+        };
+        let found = names(&model, record);
+        let is = |at: usize, seen: &str, state: Option<&str>| {
+            assert_eq!(
+                found[at],
+                (seen.to_owned(), state.map(str::to_owned)),
+                "{at}"
+            );
+        };
+        assert_eq!(found.len(), 23);
+        is(0, "none", Some("STUCK_NEW"));
+        is(1, "STUCK_NEW", Some("STUCK_NEW"));
+        (2..22).for_each(|at| is(at, "settled", Some("STUCK")));
+        is(22, "settled", None);
+        record.check(&model).unwrap();
+    }
+
+    #[test]
+    fn nothing_is_known_without_an_alarm() {
+        let model = model();
+        let mut rover = Rover {
+            recorder: EvidenceRecorder::new(&model, EPOCH_S),
+            model: &model,
+            t_ns: 0,
+        };
+        for (p, alarm) in [
+            (0.1, true),
+            (0.9, true),
+            (0.8, false),
+            (0.9, true),
+            (0.8, true),
+        ] {
+            rover.believes(&[("STUCK", p), ("ND", 1.0 - p)], alarm, RecoveryKind::GoOn);
+        }
+        let records = rover.recorder.finish();
+        let known: Vec<bool> = records[0].labels.iter().map(Option::is_some).collect();
+        assert_eq!(known, [true, true, false, false, true]);
     }
 }

@@ -11,7 +11,7 @@ use vigil_bench::corridors::{self, CorridorArm, CorridorGraph, CorridorPlan, Esc
 use vigil_bench::tuning::tune;
 use vigil_bench::variation::Variation;
 
-use super::{MissionArgs, demand_none, drive_all, write_records};
+use super::{MissionArgs, demand_none, drive_all, share, write_records};
 
 /// Which missions.
 #[derive(Debug, clap::Args)]
@@ -27,7 +27,7 @@ pub struct Args {
     #[arg(long, value_name = "F", conflicts_with_all = ["sweep", "vary", "json"])]
     record: Option<PathBuf>,
     /// Share of the decisions that are recorded in which something else is tried.
-    #[arg(long, value_name = "P", default_value_t = 0.3, requires = "record")]
+    #[arg(long, value_name = "P", default_value_t = 0.3, value_parser = share, requires = "record")]
     tried: f64,
     #[command(flatten)]
     common: MissionArgs,

@@ -12,7 +12,7 @@ use vigil_bench::missions::{self, Arm, Plan, Rule, Rules, ShippedGraph};
 use vigil_bench::tuning::tune;
 use vigil_bench::variation::Variation;
 
-use super::{MissionArgs, demand_none, drive_all, write_records};
+use super::{MissionArgs, demand_none, drive_all, share, write_records};
 
 /// Which missions.
 #[derive(Debug, clap::Args)]
@@ -27,6 +27,9 @@ pub struct Args {
     /// for `vigil pomdp fit`.
     #[arg(long, value_name = "F", conflicts_with_all = ["sweep", "vary", "json"])]
     record: Option<PathBuf>,
+    /// Share of the alarms that are recorded after which something else is tried.
+    #[arg(long, value_name = "P", default_value_t = 0.5, value_parser = share, requires = "record")]
+    tried: f64,
     #[command(flatten)]
     common: MissionArgs,
 }
@@ -42,8 +45,12 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let shipped = ShippedGraph::read(&args.config, Variation::default())?;
     let plans = shipped.plans(args.per_kind, args.common.first_seed());
     if let Some(path) = &args.record {
-        let records = drive_all(&plans, |plan| missions::record(&shipped, plan))?.concat();
-        let policy = shipped.setup.file.supervisor.policy.clone();
+        let records =
+            drive_all(&plans, |plan| missions::record(&shipped, plan, args.tried))?.concat();
+        let policy = format!(
+            "{}, {} tried",
+            shipped.setup.file.supervisor.policy, args.tried
+        );
         return write_records(path, policy, &shipped.setup.decision, &records);
     }
     match args.common.sweep {

@@ -1,6 +1,7 @@
 //! The shipped recovery model: what its file holds, and what its policy does.
 
-use vigil_missions::recovery::{ParameterError, Parameters, generate};
+use vigil_missions::learning::Record;
+use vigil_missions::recovery::{ParameterError, Parameters, fit, generate};
 use vigil_pomdp::policy::Policy;
 use vigil_pomdp::policy_file::PolicyFile;
 use vigil_pomdp::{PointBased, Pomdp, QMdp, mdp};
@@ -85,7 +86,7 @@ fn actions_differ_in_more_than_what_a_step_costs() {
     assert_eq!(model.likelihood(go, settled)[state(&model, "UNKNOWN")], 1.0);
     assert_eq!(
         model.likelihood(go, seen("STUCK_NEW"))[state(&model, "STUCK_NEW")],
-        0.5
+        0.91
     );
 }
 
@@ -101,8 +102,8 @@ fn a_step_is_made_of_the_rates_and_prices_of_the_file() {
     // 0.02 /s and 0.002 /s in 0.1 s, four fifths of these drivable, and 1.1 cm of 9 m.
     assert!((to("ND_NEW") - 0.002).abs() < 1e-12 && (to("SEVERAL_NEW") - 0.00004).abs() < 1e-12);
     assert!((to("SEVERAL_DRIVABLE_NEW") - 0.00016).abs() < 1e-12);
-    // Evidence ends five times a second.
-    assert!((to("STUCK") - 0.5).abs() < 1e-12);
+    // Evidence ends 5.6 times a second.
+    assert!((to("STUCK") - 0.56).abs() < 1e-12);
     assert!((to("DONE") - 0.22 * 0.5 * 0.1 / 9.0).abs() < 1e-12);
     // Half of 200 a metre for 1.1 cm, and a tenth of a second.
     let price = |s: usize, a: &str| -model.reward(s, action(&model, a));
@@ -121,6 +122,75 @@ fn a_step_is_made_of_the_rates_and_prices_of_the_file() {
     assert!((start[stuck] - alone * parameters.fault[0].arises_1_h / sum).abs() < 1e-12);
     assert!((start[state(&model, "SEVERAL_DRIVABLE_NEW")] - 0.6 * 0.05 * 0.8).abs() < 1e-12);
     assert!((start.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn evidence_is_counted_where_it_may_come() {
+    let (model, parameters) = (model(), parameters());
+    let observation = |name: &str| model.observations().iter().position(|o| o == name).unwrap();
+    let record = |steps: &[(&str, &str)], states: &[Option<&str>]| Record {
+        actions: steps.iter().map(|s| action(&model, s.0) as u32).collect(),
+        observations: steps.iter().map(|s| observation(s.1) as u32).collect(),
+        rewards: Vec::new(),
+        labels: states
+            .iter()
+            .map(|name| name.map(|name| state(&model, name) as u32))
+            .collect(),
+    };
+    let records = [
+        record(
+            &[
+                ("go_on", "STUCK_NEW"),
+                ("go_on", "none"),
+                ("go_on", "settled"),
+            ],
+            &[
+                Some("STUCK_NEW"),
+                Some("STUCK_NEW"),
+                Some("STUCK_NEW"),
+                Some("STUCK"),
+            ],
+        ),
+        // A robot that stands shows nothing, and of what is not known nothing is counted.
+        record(
+            &[
+                ("slow_down", "ENCODER_NEW"),
+                ("stop", "none"),
+                ("go_on", "none"),
+            ],
+            &[
+                Some("UNKNOWN_NEW"),
+                Some("UNKNOWN_NEW"),
+                Some("UNKNOWN_NEW"),
+                None,
+            ],
+        ),
+    ];
+    let chance = |weight: f64, key: &str| {
+        let found = fit(&parameters, &model, &records, weight);
+        let chance = found.chances.iter().find(|chance| chance.key == key);
+        chance.map(|chance| (chance.count, chance.visits, chance.fitted))
+    };
+    assert_eq!(chance(0.0, "go_on: sees"), Some((1.0, 2.0, 0.5)));
+    assert_eq!(chance(0.0, "slow_down: sees"), Some((0.0, 1.0, 0.0)));
+    assert_eq!(chance(0.0, "stop: sees"), None);
+    assert_eq!(chance(0.0, "compensate: sees"), None);
+    // One step spoke for the truth, one for something else.
+    assert_eq!(chance(0.0, "confused"), Some((1.0, 1.0, 1.0)));
+    assert_eq!(chance(0.0, "settles, a step"), Some((1.0, 4.0, 0.25)));
+    let found = fit(&parameters, &model, &records, 0.0);
+    assert_eq!(found.steps, 4);
+    assert!((found.parameters.evidence.settles_1_s - 2.5).abs() < 1e-12);
+    // What is thought by hand counts as so many visits.
+    let (by_hand, weighted) = (parameters.action[0].sees, chance(6.0, "go_on: sees"));
+    assert_eq!(weighted, Some((1.0, 2.0, (1.0 + 6.0 * by_hand) / 8.0)));
+    // Every fit is a model, and can be written.
+    generate(&found.parameters).unwrap();
+    let text = toml::to_string(&found.parameters).unwrap();
+    assert_eq!(
+        toml::from_str::<Parameters>(&text).unwrap(),
+        found.parameters
+    );
 }
 
 #[test]
