@@ -94,3 +94,96 @@ impl Explorer {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::corridors::CorridorGraph;
+    use crate::variation::Variation;
+
+    struct Corridor {
+        explorer: Explorer,
+        names: Vec<String>,
+        decisions: u64,
+        steps: u64,
+    }
+
+    impl Corridor {
+        fn new(share: f64) -> Self {
+            let setup = CorridorGraph::read(Variation::default(), None)
+                .unwrap()
+                .setup;
+            Self {
+                explorer: Explorer::new(&setup, share, 7),
+                names: setup.decision.actions().to_vec(),
+                decisions: 0,
+                steps: 0,
+            }
+        }
+
+        fn index(&self, name: &str) -> u32 {
+            self.names.iter().position(|it| it == name).unwrap() as u32
+        }
+
+        /// The supervisor decides on this action, after a step of the one before, of which the
+        /// robot says this. What is done, and which step is said to have been made.
+        fn decides(&mut self, name: &str, of: &str, outcome: ActionOutcome) -> (String, String) {
+            self.decisions += 1;
+            self.steps += 1;
+            let mut action = Action {
+                action: self.index(name),
+                decision_seq: self.decisions,
+                step_count: self.steps,
+                step_action: self.index(of),
+                ..Action::default()
+            };
+            let frame = SensorFrame {
+                action_outcome: outcome as u32,
+                ..SensorFrame::default()
+            };
+            self.explorer.change(&mut action, &frame);
+            let name = |action: u32| self.names[action as usize].clone();
+            (name(action.action), name(action.step_action))
+        }
+    }
+
+    #[test]
+    fn nothing_is_tried_with_a_share_of_0() {
+        let mut corridor = Corridor::new(0.0);
+        for _ in 0..20 {
+            let done = corridor.decides("GO", "FP", ActionOutcome::Succeeded);
+            assert_eq!(done, ("GO".to_owned(), "FP".to_owned()));
+        }
+    }
+
+    #[test]
+    fn what_was_tried_is_what_is_said_to_have_been_done() {
+        let mut corridor = Corridor::new(1.0);
+        let (mut before, _) = corridor.decides("GO", "FP", ActionOutcome::None);
+        let mut tried = vec![before.clone()];
+        for _ in 0..40 {
+            // It was asked for GO, and has done what was tried instead.
+            let (done, made) = corridor.decides("GO", "GO", ActionOutcome::Succeeded);
+            assert_eq!(made, before);
+            tried.push(done.clone());
+            before = done;
+        }
+        tried.sort();
+        tried.dedup();
+        assert_eq!(tried.len(), TRIED.len(), "{tried:?}");
+        // What cannot be done is a step of following the path, but where the robot reports it.
+        for _ in 0..40 {
+            let (done, made) = corridor.decides("GO", "GO", ActionOutcome::Failed);
+            let reports = ["NP", "GO"].contains(&before.as_str());
+            assert_eq!(
+                made,
+                if reports { before.as_str() } else { "FP" },
+                "{before}"
+            );
+            before = done;
+        }
+        // An action without an end is not replaced.
+        let (done, _) = corridor.decides("FP", "GO", ActionOutcome::None);
+        assert_eq!(done, "FP");
+    }
+}

@@ -95,3 +95,71 @@ impl AnswerableFaults {
             && self.stuck.iter().all(|side| (set & side).count_ones() <= 1)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LF: u64 = 1 << 1;
+    const LM: u64 = 1 << 2;
+    const RF: u64 = 1 << 3;
+    const LF_ENCODER: u64 = 1 << 4;
+    const SERVO: u64 = 1 << 5;
+
+    /// Of the rover, whose wheels 0 and 1 are on the left and 3 on the right. Node 6 is a stuck
+    /// wheel that no counter-steering is known for.
+    fn answerable(kinds: &[RecoveryKind]) -> AnswerableFaults {
+        let leaf = |node, kind, wheel| Leaf { node, kind, wheel };
+        let leaves = [
+            leaf(1, LeafKind::Stuck, Some(0)),
+            leaf(2, LeafKind::Stuck, Some(1)),
+            leaf(3, LeafKind::Stuck, Some(3)),
+            leaf(4, LeafKind::Encoder, Some(0)),
+            leaf(5, LeafKind::Other, Some(0)),
+            leaf(6, LeafKind::Stuck, Some(4)),
+        ];
+        let action = |kind: &RecoveryKind| ActionMeaning {
+            kind: *kind,
+            speed_scale: 1.0,
+            has_end: false,
+            epoch_ns: None,
+        };
+        let actions: Vec<ActionMeaning> = kinds.iter().map(action).collect();
+        let compensation = [0, 1, 3].map(|wheel| Compensation {
+            wheel,
+            curvature_gain: 1.0,
+            curvature_offset_1_m: 0.0,
+        });
+        let text = include_str!("../../../config/robots/rover.toml");
+        let robot: Description = toml::from_str(text).unwrap();
+        AnswerableFaults::new(&leaves, &actions, &robot, &compensation)
+    }
+
+    #[test]
+    fn what_is_answered_alone_needs_its_action_and_a_known_counter_steering() {
+        let both = answerable(&[RecoveryKind::Compensate, RecoveryKind::IgnoreEncoder]);
+        assert!(both.are_singles(LF | LM | RF) && both.are_singles(LF_ENCODER));
+        assert!(!both.are_singles(LF | SERVO) && !both.are_singles(1 << 6));
+        assert!(!both.are_singles(0));
+        let one = answerable(&[RecoveryKind::IgnoreEncoder]);
+        assert!(one.are_singles(LF_ENCODER) && !one.are_singles(LF));
+        assert!(!both.sets().are_singles(LF_ENCODER));
+    }
+
+    #[test]
+    fn a_robot_is_driven_home_with_one_stuck_wheel_a_side() {
+        let home = answerable(&[]).sets();
+        for (set, is_drivable) in [
+            (LF | RF, true),
+            (LF | RF | LF_ENCODER, true),
+            (LF | LF_ENCODER, true),
+            (LF | LM, false),
+            (LF | SERVO, false),
+            (LF | 1 << 6, false),
+            (LF, false),
+            (0, false),
+        ] {
+            assert_eq!(home.are_drivable(set), is_drivable, "{set:b}");
+        }
+    }
+}

@@ -71,6 +71,36 @@ fn the_belief_is_followed_by_names_and_by_numbers() {
 }
 
 #[test]
+fn what_a_policy_does_at_each_belief_is_told() {
+    let folder = TempDir::new().unwrap();
+    let tiger = write(&folder, "tiger.pomdp", TIGER);
+    let policy = folder.path().join("tiger.json");
+    let policy = policy.to_str().unwrap();
+    let solve = ["solve", &tiger, "--precision", "0.01", "--out", policy];
+    assert_eq!(vigil(&solve).status.code(), Some(0));
+    let steps = "listen:hear-left,listen:hear-left";
+    let arguments = ["track", &tiger, "--steps", steps, "--policy-file", policy];
+    // Tiger at .95: two more noises on one side than on the other, and the other door is opened.
+    let shown = text(&vigil(&arguments).stdout);
+    let actions: Vec<&str> = shown
+        .lines()
+        .filter_map(|line| line.split("-> ").nth(1)?.split(' ').next())
+        .collect();
+    assert_eq!(actions, ["listen", "listen", "open-right"]);
+    let document = document(&vigil(&[&arguments[..], &["--json"]].concat()));
+    let last = &document["steps"][1]["decision"];
+    assert_eq!(last["action"], "open-right");
+    let mut values = numbers(&last["values"]);
+    values.sort_by(f64::total_cmp);
+    let margin = last["margin"].as_f64().unwrap();
+    assert!((values[2] - values[1] - margin).abs() < 1e-9 && margin > 0.0);
+    let foreign = write(&folder, "other.pomdp", &TIGER.replace("0.95", "0.9"));
+    let refused = vigil(&["track", &foreign, "--steps", "", "--policy-file", policy]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("--policy-file"));
+}
+
+#[test]
 fn impossible_steps_are_told() {
     let folder = TempDir::new().unwrap();
     let sharp = TIGER.replace("0.85 0.15 0.15 0.85", "1 0 0 1");

@@ -1,18 +1,21 @@
-//! `vigil pomdp track`: the belief after each of some actions and observations.
+//! `vigil pomdp track`: the belief after each of some actions and observations, and what a policy
+//! does about it.
 
 use std::path::PathBuf;
 
 use serde::Serialize;
 use vigil_missions::learning::file::index_of;
-use vigil_pomdp::{Evidence, Pomdp, Tracker};
+use vigil_pomdp::policy::Policy;
+use vigil_pomdp::{Evidence, PointBased, Pomdp, Tracker};
 
-use super::{load, print};
+use super::{load, print, solved};
 use vigil_terminal::{CommandError, Outcome};
 
 /// Prints the belief after each action and observation.
 ///
 /// After an impossible observation the belief is the prediction with 0.01 of the start belief mixed
-/// in, and the exit code is 1.
+/// in, and the exit code is 1. With a policy the action that it chooses at each belief follows,
+/// with the value of the runner-up below its own.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model (.pomdp or .pomdpx).
@@ -21,6 +24,9 @@ pub struct Args {
     /// Action and observation of each step, names or numbers, separated by commas.
     #[arg(long, value_name = "A:O,A:O,...")]
     steps: String,
+    /// A policy, as `vigil pomdp solve FILE --out POLICY` writes it.
+    #[arg(long, value_name = "POLICY")]
+    policy_file: Option<PathBuf>,
     /// Print one JSON document.
     #[arg(long)]
     json: bool,
@@ -32,7 +38,10 @@ struct Document {
     file: String,
     hash: String,
     states: Vec<String>,
+    actions: Vec<String>,
     start: Vec<f64>,
+    /// What the policy does at the start; null without one.
+    start_decision: Option<Decision>,
     steps: Vec<Step>,
     impossible_steps: usize,
     /// Of all steps; null if one was impossible.
@@ -48,6 +57,30 @@ struct Step {
     probability: f64,
     impossible: bool,
     entropy: f64,
+    /// What the policy does next; null without one.
+    decision: Option<Decision>,
+}
+
+/// What a policy does at a belief.
+#[derive(Debug, Serialize)]
+struct Decision {
+    action: String,
+    /// Its value minus the runner-up's.
+    margin: f64,
+    /// What it thinks of each action.
+    values: Vec<f64>,
+}
+
+impl Decision {
+    fn of(policy: &mut PointBased, model: &Pomdp, belief: &[f64]) -> Self {
+        let mut values = vec![0.0; model.actions().len()];
+        let choice = policy.evaluate(belief, &mut values);
+        Self {
+            action: model.actions()[choice.action].clone(),
+            margin: choice.margin,
+            values,
+        }
+    }
 }
 
 /// Prints the beliefs.
@@ -57,7 +90,9 @@ struct Step {
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let model = load(&args.file)?;
     let steps = pairs(&model, &args.steps).map_err(CommandError::usage)?;
-    let document = follow(args, &model, &steps);
+    let policy = args.policy_file.as_deref();
+    let policy = policy.map(|path| solved::load(&model, "--policy-file", path));
+    let document = follow(args, &model, &steps, policy.transpose()?);
     print(args.json, &document, || table(&document))?;
     Ok(match document.impossible_steps {
         0 => Outcome::Done,
@@ -83,9 +118,16 @@ pub(super) fn pairs(model: &Pomdp, text: &str) -> Result<Vec<(usize, usize)>, St
     steps.collect()
 }
 
-fn follow(args: &Args, model: &Pomdp, steps: &[(usize, usize)]) -> Document {
+fn follow(
+    args: &Args,
+    model: &Pomdp,
+    steps: &[(usize, usize)],
+    mut policy: Option<PointBased>,
+) -> Document {
     let mut tracker = Tracker::new(model);
+    let mut decide = |belief: &[f64]| Some(Decision::of(policy.as_mut()?, model, belief));
     let start = tracker.belief().to_vec();
+    let start_decision = decide(&start);
     let mut log_likelihood = Some(0.0);
     let steps: Vec<Step> = steps
         .iter()
@@ -106,6 +148,7 @@ fn follow(args: &Args, model: &Pomdp, steps: &[(usize, usize)]) -> Document {
                 probability,
                 impossible,
                 entropy: tracker.entropy(),
+                decision: decide(tracker.belief()),
             }
         })
         .collect();
@@ -114,7 +157,9 @@ fn follow(args: &Args, model: &Pomdp, steps: &[(usize, usize)]) -> Document {
         file: args.file.display().to_string(),
         hash: format!("{:016x}", model.hash()),
         states: model.states().to_vec(),
+        actions: model.actions().to_vec(),
         start,
+        start_decision,
         impossible_steps: steps.iter().filter(|step| step.impossible).count(),
         steps,
         log_likelihood,
@@ -132,11 +177,16 @@ fn table(document: &Document) -> String {
         let named = named.map(|&s| format!("{} {:.6}", document.states[s], belief[s]));
         named.collect::<Vec<_>>().join("  ") + more
     };
+    let chosen = |decision: &Option<Decision>| match decision {
+        Some(of) => format!("  -> {} (by {:.3})", of.action, of.margin),
+        None => String::new(),
+    };
     let mut lines = vec![format!(
-        "{:24} {:>10}  {}",
+        "{:24} {:>10}  {}{}",
         "start",
         "",
-        best(&document.start)
+        best(&document.start),
+        chosen(&document.start_decision)
     )];
     for step in &document.steps {
         let name = format!("{}:{}", step.action, step.observation);
@@ -145,8 +195,8 @@ fn table(document: &Document) -> String {
         } else {
             format!("{:.6}", step.probability)
         };
-        let belief = best(&step.belief);
-        lines.push(format!("{name:24} {probability:>10}  {belief}"));
+        let (belief, chosen) = (best(&step.belief), chosen(&step.decision));
+        lines.push(format!("{name:24} {probability:>10}  {belief}{chosen}"));
     }
     match document.log_likelihood {
         Some(sum) => lines.push(format!("log-likelihood {sum:.6}")),
