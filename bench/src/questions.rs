@@ -132,7 +132,7 @@ fn drive_all<P: Sync, M: Send>(
     Ok(missions?)
 }
 
-/// Writes the steps of a decision model in missions, as `vigil pomdp fit` and `learn` read them.
+/// Writes the steps of a decision model in missions, as `vigil pomdp fit` reads them.
 fn write_records(
     path: &Path,
     policy: String,

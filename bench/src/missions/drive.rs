@@ -138,7 +138,7 @@ pub fn record(
     tried_share: f64,
 ) -> Result<Vec<Record>, Box<dyn Error>> {
     let epoch_s = shipped.setup.file.supervisor.epoch_ms * 1e-3;
-    let mut recorder = EvidenceRecorder::new(&shipped.setup.decision, epoch_s);
+    let mut recorder = EvidenceRecorder::new(&shipped.setup.decision, epoch_s)?;
     let arm = Arm::Explorer(tried_share);
     ride(shipped, plan, arm, &mut |t_ns, faults, action| {
         recorder.take(t_ns, faults, action);

@@ -31,9 +31,15 @@ impl Explorer {
         let names = setup.decision.actions().iter().zip(0..);
         let kinds = &setup.file.supervisor.actions;
         let tried = names.filter_map(|(name, action)| {
-            let kind = RecoveryKind::from(kinds.get(name)?.kind);
+            let of = kinds.get(name)?;
+            let kind = RecoveryKind::from(of.kind);
             let block = action_block(setup, RuleOutput::plain(kind));
-            TRIED.contains(&kind).then_some(Action { action, ..block })
+            let speed_scale = of.speed_scale.unwrap_or(block.speed_scale);
+            TRIED.contains(&kind).then_some(Action {
+                action,
+                speed_scale,
+                ..block
+            })
         });
         Self {
             share,

@@ -1,13 +1,13 @@
 //! Evidence of each epoch in a mission, with what was true, as steps of the decision model.
 //!
 //! The decision model's observation of an epoch is what its evidence speaks for most: the condition
-//! whose probability rose most, if the belief moved at all. A condition counts as new from when it
-//! is there, or from the alarm, until nothing has been said of it for [`QUIET_S`]; then it has
-//! settled. What is said later, the model holds impossible: such a step has no true state. Nor has
-//! one in which no alarm stands, or rises: before it the model has not begun.
+//! whose probability rose most, if the belief moved at all. Whether more evidence comes nobody
+//! sees: what is true is always given as the new state of its condition, and `vigil pomdp fit`
+//! infers the rest.
 //!
-//! So what is new is what more will be said of. Who waits cannot know that: chances that are
-//! counted by it, of evidence and of its end, are a tenth too high in the rover's missions.
+//! A step has no true state in which no alarm stands, or rises: before it the model has not begun.
+
+use std::error::Error;
 
 use vigil_blocks::{Action, RecoveryKind};
 use vigil_missions::learning::Record;
@@ -19,30 +19,20 @@ use super::rules::RuleOutput;
 /// A belief that moves by less in an epoch has not been told anything (half the sum of absolute
 /// differences): as much as the supervisor calls a move.
 const MOVED: f64 = 0.05;
-/// So long without evidence, and it has ended, s. Chosen: longer than what an identifier's window
-/// holds; less would cut evidence in two.
-const QUIET_S: f64 = 1.0;
 /// What is less than this share of what it grows to is not yet a fault of the model.
 const SEVERE: f64 = 0.5;
 /// End of the name of a state of which evidence comes.
 const NEW: &str = "_NEW";
-
-/// An epoch.
-struct EpochStep {
-    action: u32,
-    /// Name of what was true at its end; `None` for what the model does not have, and while no
-    /// alarm stands.
-    truth: Option<&'static str>,
-    /// The condition that its evidence speaks for.
-    said: Option<usize>,
-}
+/// Observation of an epoch in which nothing is told.
+const NONE: &str = "none";
 
 /// The beginning of an epoch.
 struct EpochBegin {
     t_ns: u64,
     action: u32,
     belief: Vec<f64>,
-    alarm: bool,
+    /// An alarm stands, and the robot moves.
+    is_known: bool,
 }
 
 /// Follows the supervisor's action blocks from an alarm to a call for help.
@@ -51,60 +41,78 @@ pub(super) struct EvidenceRecorder<'a> {
     epoch_ns: u64,
     /// For each state, the settled one of the same condition.
     settled: Vec<usize>,
+    none: u32,
     began: Option<EpochBegin>,
-    before: Option<&'static str>,
-    steps: Vec<EpochStep>,
+    record: Record,
     records: Vec<Record>,
 }
 
 impl<'a> EvidenceRecorder<'a> {
     /// Of a model whose steps last `epoch_s`.
-    pub(super) fn new(model: &'a Pomdp, epoch_s: f64) -> Self {
+    ///
+    /// # Errors
+    /// A model that does not say which states are new.
+    pub(super) fn new(model: &'a Pomdp, epoch_s: f64) -> Result<Self, Box<dyn Error>> {
         let names = model.states();
         let settled = names.iter().enumerate().map(|(state, name)| {
             let of = name.strip_suffix(NEW);
             of.and_then(|of| names.iter().position(|it| it == of))
                 .unwrap_or(state)
         });
-        Self {
+        let observed = |name: &str| model.observations().iter().position(|of| of == name);
+        let none = observed(NONE).filter(|_| names.iter().any(|name| name.ends_with(NEW)));
+        let none = none.ok_or(
+            "a decision model with states of which evidence comes (`_NEW`) and an observation \
+             `none` is wanted: one of `model = \"recovery\"`",
+        )?;
+        Ok(Self {
             settled: settled.collect(),
+            none: none as u32,
             model,
             epoch_ns: (epoch_s * 1e9).round() as u64,
             began: None,
-            before: None,
-            steps: Vec::new(),
+            record: Record::default(),
             records: Vec::new(),
-        }
+        })
     }
 
     /// Takes the time of a frame, what is wrong then, and the action block after it.
     pub(super) fn take(&mut self, t_ns: u64, faults: &[PresentFault], action: &Action) {
-        if action.kind == RecoveryKind::CallForHelp as u32 {
-            return self.end();
-        }
-        if self.began.is_none() && action.alarm == 0 {
+        let calls = action.kind == RecoveryKind::CallForHelp as u32;
+        if self.began.is_none() && (calls || action.alarm == 0) {
             return;
         }
         let belief = self.folded(action);
-        let alarm = action.alarm != 0;
+        let stands = action.kind == RecoveryKind::Stop as u32;
+        let is_known = action.alarm != 0 && !stands;
         match &self.began {
-            None => self.before = truth(faults),
-            Some(began) if t_ns < began.t_ns + self.epoch_ns => return,
-            Some(began) => self.steps.push(EpochStep {
-                action: began.action,
-                truth: truth(faults).filter(|_| began.alarm && alarm),
-                said: said(&began.belief, &belief),
-            }),
+            None => {
+                let state = self.state(faults);
+                self.record.labels.push(state);
+            }
+            Some(began) if t_ns < began.t_ns + self.epoch_ns && !calls => return,
+            Some(began) => {
+                let is_known = began.is_known && action.alarm != 0;
+                let said = said(&began.belief, &belief);
+                let seen = said.and_then(|condition| self.observation(condition));
+                let state = self.state(faults).filter(|_| is_known);
+                self.record.actions.push(began.action);
+                self.record.observations.push(seen.unwrap_or(self.none));
+                self.record.labels.push(state);
+            }
+        }
+        if calls {
+            return self.end();
         }
         self.began = Some(EpochBegin {
             t_ns,
             action: action.action,
             belief,
-            alarm,
+            is_known,
         });
     }
 
-    /// What was recorded, one record for each alarm.
+    /// What was recorded, one record from an alarm to a call or the end.
     pub(super) fn finish(mut self) -> Vec<Record> {
         self.end();
         self.records
@@ -121,68 +129,25 @@ impl<'a> EvidenceRecorder<'a> {
 
     fn end(&mut self) {
         self.began = None;
-        let steps = std::mem::take(&mut self.steps);
-        if steps.is_empty() {
-            return;
+        let record = std::mem::take(&mut self.record);
+        if !record.actions.is_empty() {
+            self.records.push(record);
         }
-        let quiet = (QUIET_S * 1e9) as usize / self.epoch_ns.max(1) as usize;
-        let new_until = new_until(&steps, quiet);
-        let mut record = Record::default();
-        record.labels.push(self.state(self.before, true));
-        for (at, step) in steps.iter().enumerate() {
-            let is_new = at < new_until[at];
-            let seen = match (is_new, step.said) {
-                (true, Some(condition)) => {
-                    format!("{}{NEW}", self.model.states()[condition])
-                }
-                (true, None) => "none".to_owned(),
-                (false, _) => "settled".to_owned(),
-            };
-            let is_known = is_new || step.said.is_none();
-            let observations = self.model.observations();
-            let Some(seen) = observations.iter().position(|name| *name == seen) else {
-                continue;
-            };
-            record.actions.push(step.action);
-            record.observations.push(seen as u32);
-            let truth = step.truth.filter(|_| is_known);
-            record.labels.push(self.state(truth, is_new));
-        }
-        self.records.push(record);
     }
 
-    /// The model's state of a condition.
-    fn state(&self, truth: Option<&'static str>, is_new: bool) -> Option<u32> {
-        let truth = truth?;
-        let name = if is_new {
-            format!("{truth}{NEW}")
-        } else {
-            truth.to_owned()
-        };
-        let state = self.model.states().iter().position(|of| *of == name)?;
-        Some(state as u32)
+    /// The model's observation of evidence for a condition.
+    fn observation(&self, condition: usize) -> Option<u32> {
+        let name = format!("{}{NEW}", self.model.states()[condition]);
+        let seen = self.model.observations().iter().position(|of| *of == name);
+        seen.map(|seen| seen as u32)
     }
-}
 
-/// For each step, the one at which what is true in it settles: the first without evidence that is
-/// followed by `quiet` others without.
-fn new_until(steps: &[EpochStep], quiet: usize) -> Vec<usize> {
-    let mut until = Vec::with_capacity(steps.len());
-    while until.len() < steps.len() {
-        let first = until.len();
-        let same = steps[first..]
-            .iter()
-            .take_while(|step| step.truth == steps[first].truth);
-        let (mut last, mut end) = (first, first);
-        for step in same {
-            if step.said.is_some() && end < last + quiet {
-                last = end + 1;
-            }
-            end += 1;
-        }
-        until.resize(end, last);
+    /// The model's new state of what is wrong.
+    fn state(&self, faults: &[PresentFault]) -> Option<u32> {
+        let name = format!("{}{NEW}", truth(faults)?);
+        let state = self.model.states().iter().position(|of| *of == name);
+        state.map(|state| state as u32)
     }
-    until
 }
 
 /// The condition whose probability has risen most, if the belief has moved.
@@ -230,16 +195,31 @@ mod tests {
         Pomdp::parse(&std::fs::read_to_string(file).unwrap()).unwrap()
     }
 
-    /// A rover with a stuck wheel that goes on, with an alarm.
+    const fn fault(cause: Cause) -> PresentFault {
+        PresentFault {
+            cause,
+            severity: 1.0,
+        }
+    }
+
+    /// A rover with a stuck wheel.
     struct Rover<'a> {
         recorder: EvidenceRecorder<'a>,
         model: &'a Pomdp,
         t_ns: u64,
     }
 
-    impl Rover<'_> {
-        /// An epoch later these are its probabilities.
-        fn believes(&mut self, parts: &[(&str, f64)], alarm: bool, kind: RecoveryKind) {
+    impl<'a> Rover<'a> {
+        fn new(model: &'a Pomdp) -> Self {
+            Self {
+                recorder: EvidenceRecorder::new(model, EPOCH_S).unwrap(),
+                model,
+                t_ns: 0,
+            }
+        }
+
+        /// These are its probabilities for a time.
+        fn believes(&mut self, parts: &[(&str, f64)], (alarm, kind): (bool, RecoveryKind), s: f64) {
             let mut action = Action {
                 alarm: u32::from(alarm),
                 kind: kind as u32,
@@ -249,82 +229,91 @@ mod tests {
                 let state = self.model.states().iter().position(|of| of == name);
                 action.belief[state.unwrap()] = *p;
             }
-            let stuck = PresentFault {
-                cause: Cause::Stuck(0),
-                severity: 1.0,
+            for _ in 0..(s * 100.0).round() as u64 {
+                let stuck = fault(Cause::Stuck(0));
+                self.recorder.take(self.t_ns, &[stuck], &action);
+                self.t_ns += 10_000_000;
+            }
+        }
+
+        /// Observations and true states of the steps, one list a record.
+        fn steps(self) -> Vec<Vec<(String, Option<String>)>> {
+            let model = self.model;
+            let steps = |record: Record| {
+                record.check(model).unwrap();
+                let seen = record.observations.iter();
+                let seen = seen.map(|o| model.observations()[*o as usize].clone());
+                let labels = record.labels[1..].iter();
+                let labels = labels.map(|l| l.map(|s| model.states()[s as usize].clone()));
+                seen.zip(labels).collect()
             };
-            self.recorder.take(self.t_ns, &[stuck], &action);
-            self.t_ns += (EPOCH_S * 1e9) as u64;
+            self.recorder.finish().into_iter().map(steps).collect()
         }
     }
 
-    fn names(model: &Pomdp, record: &Record) -> Vec<(String, Option<String>)> {
-        let seen = record.observations.iter();
-        let seen = seen.map(|o| model.observations()[*o as usize].clone());
-        let labels = record.labels[1..].iter();
-        let labels = labels.map(|label| label.map(|s| model.states()[s as usize].clone()));
-        seen.zip(labels).collect()
+    const GOES_ON: (bool, RecoveryKind) = (true, RecoveryKind::GoOn);
+
+    fn step(seen: &str, state: &str) -> (String, Option<String>) {
+        (seen.to_owned(), Some(state.to_owned()))
     }
 
     #[test]
-    fn evidence_is_new_from_the_alarm_until_it_is_quiet() {
+    fn steps_go_from_an_alarm_to_a_call() {
         let model = model();
-        let mut rover = Rover {
-            recorder: EvidenceRecorder::new(&model, EPOCH_S),
-            model: &model,
-            t_ns: 0,
-        };
-        let go_on = RecoveryKind::GoOn;
-        rover.believes(&[("ND", 1.0)], false, go_on);
-        rover.believes(&[("UNKNOWN_NEW", 0.8), ("STUCK_NEW", 0.2)], true, go_on);
+        let mut rover = Rover::new(&model);
+        rover.believes(&[("ND", 1.0)], (false, RecoveryKind::GoOn), 1.0);
+        rover.believes(&[("UNKNOWN_NEW", 0.8), ("STUCK_NEW", 0.2)], GOES_ON, 0.1);
         // Too little to be told anything; that something has settled is no evidence; then it is.
-        rover.believes(&[("UNKNOWN", 0.78), ("STUCK", 0.22)], true, go_on);
-        rover.believes(&[("UNKNOWN_NEW", 0.1), ("STUCK_NEW", 0.9)], true, go_on);
-        for _ in 0..20 {
-            rover.believes(&[("UNKNOWN", 0.1), ("STUCK", 0.9)], true, go_on);
-        }
-        // Late news, which the model holds impossible.
-        rover.believes(&[("UNKNOWN", 0.9), ("STUCK", 0.1)], true, go_on);
-        rover.believes(&[("UNKNOWN", 0.9)], true, RecoveryKind::CallForHelp);
-        let records = rover.recorder.finish();
-        let [record] = records.as_slice() else {
-            panic!("{records:?}");
-        };
-        let found = names(&model, record);
-        let is = |at: usize, seen: &str, state: Option<&str>| {
-            assert_eq!(
-                found[at],
-                (seen.to_owned(), state.map(str::to_owned)),
-                "{at}"
-            );
-        };
-        assert_eq!(found.len(), 23);
-        is(0, "none", Some("STUCK_NEW"));
-        is(1, "STUCK_NEW", Some("STUCK_NEW"));
-        (2..22).for_each(|at| is(at, "settled", Some("STUCK")));
-        is(22, "settled", None);
-        record.check(&model).unwrap();
+        rover.believes(&[("UNKNOWN", 0.78), ("STUCK", 0.22)], GOES_ON, 0.1);
+        rover.believes(&[("UNKNOWN_NEW", 0.1), ("STUCK_NEW", 0.9)], GOES_ON, 0.13);
+        // The evidence that leads to a call counts, though its epoch is not over.
+        let call = (true, RecoveryKind::CallForHelp);
+        rover.believes(&[("UNKNOWN_NEW", 0.9), ("STUCK_NEW", 0.1)], call, 1.0);
+        rover.believes(&[("ND", 1.0)], (false, RecoveryKind::GoOn), 1.0);
+        let steps = rover.steps();
+        let seen = ["none", "STUCK_NEW", "none", "UNKNOWN_NEW"];
+        assert_eq!(steps, [seen.map(|seen| step(seen, "STUCK_NEW"))]);
     }
 
     #[test]
-    fn nothing_is_known_without_an_alarm() {
+    fn nothing_is_known_without_an_alarm_or_of_a_robot_that_stands() {
         let model = model();
-        let mut rover = Rover {
-            recorder: EvidenceRecorder::new(&model, EPOCH_S),
-            model: &model,
-            t_ns: 0,
-        };
-        for (p, alarm) in [
-            (0.1, true),
-            (0.9, true),
-            (0.8, false),
-            (0.9, true),
-            (0.8, true),
+        let mut rover = Rover::new(&model);
+        let stands = (true, RecoveryKind::Stop);
+        let quiet = (false, RecoveryKind::GoOn);
+        for told in [
+            GOES_ON, GOES_ON, quiet, GOES_ON, GOES_ON, stands, GOES_ON, GOES_ON,
         ] {
-            rover.believes(&[("STUCK", p), ("ND", 1.0 - p)], alarm, RecoveryKind::GoOn);
+            rover.believes(&[("STUCK", 1.0)], told, 0.1);
         }
-        let records = rover.recorder.finish();
-        let known: Vec<bool> = records[0].labels.iter().map(Option::is_some).collect();
-        assert_eq!(known, [true, true, false, false, true]);
+        let steps = rover.steps();
+        let known: Vec<bool> = steps[0].iter().map(|(_, state)| state.is_some()).collect();
+        assert_eq!(known, [true, false, false, true, true, false, true]);
+    }
+
+    #[test]
+    fn a_model_without_new_states_is_refused() {
+        let file = crate::root().join("config/navigation.pomdp");
+        let model = Pomdp::parse(&std::fs::read_to_string(file).unwrap()).unwrap();
+        assert!(EvidenceRecorder::new(&model, EPOCH_S).is_err());
+    }
+
+    #[test]
+    fn what_is_wrong_has_the_models_name() {
+        let [lf, lm, rf] = [0, 1, 3].map(|wheel| fault(Cause::Stuck(wheel)));
+        let encoder = fault(Cause::Encoder(0));
+        let unmodelled = fault(Cause::Unmodelled);
+        assert_eq!(truth(&[]), Some("ND"));
+        assert_eq!(truth(&[lf]), Some("STUCK"));
+        assert_eq!(truth(&[encoder]), Some("ENCODER"));
+        assert_eq!(truth(&[unmodelled]), Some("UNKNOWN"));
+        assert_eq!(truth(&[lf, rf]), Some("SEVERAL_DRIVABLE"));
+        assert_eq!(truth(&[lf, lm]), Some("SEVERAL"));
+        assert_eq!(truth(&[encoder, unmodelled]), Some("SEVERAL"));
+        let small = PresentFault {
+            severity: 0.4,
+            ..lf
+        };
+        assert_eq!(truth(&[small]), None);
     }
 }

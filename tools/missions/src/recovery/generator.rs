@@ -279,7 +279,8 @@ impl Model<'_> {
         let seen: Vec<f64> = seen.collect();
         let is_settled = !of.is_new && !matches!(of.condition, Condition::Done);
         let settled = f64::from(u8::from(is_settled));
-        let none = 1.0 - settled - seen.iter().sum::<f64>();
+        // A sum of 1 may round to more.
+        let none = (1.0 - settled - seen.iter().sum::<f64>()).max(0.0);
         [none, settled].into_iter().chain(seen).collect()
     }
 

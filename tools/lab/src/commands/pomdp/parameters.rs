@@ -37,13 +37,14 @@ impl ParameterFile {
         let text = fs::read_to_string(path).map_err(|error| {
             CommandError::usage(format!("{}: cannot be read: {error}", path.display()))
         })?;
-        let mut file = Self {
+        let head: Result<Head, _> = toml::from_str(&text);
+        let head =
+            head.map_err(|error| CommandError::usage(format!("{}: {error}", path.display())))?;
+        Ok(Self {
             path: path.to_owned(),
             text,
-            model: ModelKind::Exceptions,
-        };
-        file.model = file.parsed::<Head>()?.model;
-        Ok(file)
+            model: head.model,
+        })
     }
 
     /// Its parameters.
