@@ -238,6 +238,8 @@ fn rows(parameters: &Parameters, model: &Pomdp, record: &Record, quiet_max: usiz
     for ((action, observation), label) in taken.zip(record.labels.iter().skip(1)) {
         let state = label.and_then(|state| model.states().get(state as usize));
         let name = state.map(|name| name.strip_suffix(NEW).unwrap_or(name));
+        // The end of a task is never new.
+        let name = name.filter(|name| model.states().contains(&format!("{name}{NEW}")));
         if name != condition {
             rows.push(std::mem::take(&mut row));
             condition = name;
