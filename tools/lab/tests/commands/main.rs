@@ -12,6 +12,7 @@ mod more_robots;
 mod offline;
 mod pomdp;
 mod pomdp_compare;
+mod pomdp_fit;
 mod pomdp_learn;
 mod pomdp_missions;
 mod pomdp_solve;

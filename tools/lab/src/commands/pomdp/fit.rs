@@ -79,7 +79,7 @@ fn run_for<P: DeserializeOwned + Serialize, E: Display>(
     } = fit(&parameters, &model, &flown.records, args.prior_strength);
     if steps == 0 {
         let missions = args.missions.display();
-        let problem = "no step to a known state: allowed are missions with 'states'";
+        let problem = "no step with known states: allowed are missions with 'states'";
         return Err(CommandError::usage(format!("{missions}: {problem}")));
     }
     let document = Document {
@@ -104,7 +104,7 @@ fn text_of(document: &Document) -> String {
     let width = width.unwrap_or(0);
     let mut lines = vec![
         format!(
-            "{} missions, {} steps to known states",
+            "{} records of missions, {} steps with known states",
             document.missions, document.steps
         ),
         format!("{:width$}  by hand  fitted  95 %            counted", ""),
