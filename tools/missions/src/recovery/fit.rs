@@ -7,8 +7,8 @@
 //! maximisation (Dempster, Laird and Rubin 1977): how many of the steps after the last evidence
 //! were still new is expected from the chances, and they are counted anew, until both agree.
 //!
-//! - A row ends where nothing has been said for [`QUIET_S`]: evidence that comes later opens another
-//!   one, as it makes new for the supervisor what had settled.
+//! - A row ends where nothing has been said for [`QUIET_S`]. Evidence that comes later opens
+//!   another one: for the supervisor, too, it makes new what had settled.
 //! - How often faults arise, pass and join is not counted: missions for this are drawn with trouble
 //!   in them. Prices are the user's.
 

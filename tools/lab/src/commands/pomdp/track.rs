@@ -72,7 +72,7 @@ struct Decision {
 }
 
 impl Decision {
-    fn of(policy: &mut PointBased, model: &Pomdp, belief: &[f64]) -> Self {
+    fn new(policy: &mut PointBased, model: &Pomdp, belief: &[f64]) -> Self {
         let mut values = vec![0.0; model.actions().len()];
         let choice = policy.evaluate(belief, &mut values);
         Self {
@@ -125,7 +125,7 @@ fn follow(
     mut policy: Option<PointBased>,
 ) -> Document {
     let mut tracker = Tracker::new(model);
-    let mut decide = |belief: &[f64]| Some(Decision::of(policy.as_mut()?, model, belief));
+    let mut decide = |belief: &[f64]| Some(Decision::new(policy.as_mut()?, model, belief));
     let start = tracker.belief().to_vec();
     let start_decision = decide(&start);
     let mut log_likelihood = Some(0.0);
