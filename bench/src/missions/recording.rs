@@ -6,6 +6,7 @@
 //! infers the rest.
 //!
 //! A step has no true state in which no alarm stands, or rises: before it the model has not begun.
+//! Nor has one of a robot that stands, or with a fault that is still small.
 
 use std::error::Error;
 
@@ -96,9 +97,12 @@ impl<'a> EvidenceRecorder<'a> {
                 let said = said(&began.belief, &belief);
                 let seen = said.and_then(|condition| self.observation(condition));
                 let state = self.state(faults).filter(|_| is_known);
-                self.record.actions.push(began.action);
-                self.record.observations.push(seen.unwrap_or(self.none));
-                self.record.labels.push(state);
+                // An epoch that a call cuts short was no silent one.
+                if !calls || seen.is_some() {
+                    self.record.actions.push(began.action);
+                    self.record.observations.push(seen.unwrap_or(self.none));
+                    self.record.labels.push(state);
+                }
             }
         }
         if calls {

@@ -11,8 +11,7 @@ use crate::state_belief::MOVED;
 use crate::states::{StateMeaning, Subject};
 
 /// Settled is what is so with this probability. Chosen: where half of what is new settles in an
-/// epoch, three epochs without news, and four where 0.38 does, as in the rover's model; fewer might
-/// call for help before the evidence is in.
+/// epoch, three epochs without news; fewer might call for help before the evidence is in.
 const SETTLED_P: f64 = 0.8;
 
 /// How probable it is that no more evidence comes.

@@ -15,7 +15,7 @@ pub struct FittedChance {
     pub by_hand: f64,
     /// What it is.
     pub fitted: f64,
-    /// Bounds of its 95 % credible interval.
+    /// Bounds of its 95 % credible interval, as if steps were independent and counts seen.
     pub interval: [f64; 2],
     /// How often it was so.
     pub count: f64,
@@ -30,7 +30,7 @@ pub struct Fit<P> {
     pub parameters: P,
     /// Numbers that were visited, in the order of the file.
     pub chances: Vec<FittedChance>,
-    /// Steps that told something.
+    /// Steps that were counted.
     pub steps: usize,
 }
 
@@ -42,6 +42,15 @@ pub(crate) struct Count {
 }
 
 impl Count {
+    /// What the counts and a chance by hand that is worth `weight` visits make together.
+    pub(crate) fn mean(self, by_hand: f64, weight: f64) -> f64 {
+        let visits = self.n + weight;
+        match visits > 0.0 && by_hand > 0.0 {
+            true => (self.k + weight * by_hand) / visits,
+            false => by_hand,
+        }
+    }
+
     /// Of the steps for which `is_visit` holds, those for which `is_so` does.
     pub(crate) fn among<S>(
         steps: &[S],
@@ -80,7 +89,7 @@ impl FittedChances {
             count.k + self.weight * by_hand,
             count.n - count.k + self.weight * (1.0 - by_hand),
         );
-        *chance = yes / (yes + no);
+        *chance = count.mean(by_hand, self.weight);
         let bound = |p| match Beta::new(yes, no) {
             Ok(beta) => beta.inverse_cdf(p),
             Err(_) => *chance,

@@ -50,7 +50,9 @@ fn what_an_action_shows_is_counted_and_written() {
         (&1.into(), &2.into())
     );
     let chances = document["chances"].as_array().unwrap();
-    let sees = chances.iter().find(|chance| chance["key"] == "go_on: sees");
+    let sees = chances
+        .iter()
+        .find(|chance| chance["key"] == "go_on: says something");
     let sees = sees.unwrap();
     assert_eq!(
         (&sees["count"], &sees["visits"]),
@@ -59,7 +61,7 @@ fn what_an_action_shows_is_counted_and_written() {
     assert_eq!(sees["fitted"], 1.0);
     let shown = String::from_utf8(vigil(&arguments).stdout).unwrap();
     assert!(
-        shown.contains("go_on: sees") && shown.contains("2 of 2"),
+        shown.contains("go_on: says something") && shown.contains("2 of 2"),
         "{shown}"
     );
     // What was written makes a model.

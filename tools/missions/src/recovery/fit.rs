@@ -1,14 +1,19 @@
 //! Evidence from recorded missions whose true states are known.
 //!
-//! Counted are steps in which the robot moves and what is wrong stays the same: in a row of them
-//! evidence may come until it settles, which nobody sees. What is new settles in a step with
-//! chance q; if it does not, evidence speaks for the truth with the action's chance `sees`, and
-//! for something else with `sees` times `confused`. These chances are found by expectation
-//! maximisation (Dempster, Laird and Rubin 1977): how many of the steps after the last evidence
-//! were still new is expected from the chances, and they are counted anew, until both agree.
+//! Counted are steps in which the robot moves and an alarm stands. They are cut into rows: one
+//! begins with an alarm, or with a change of what is wrong. In a row evidence may come until it
+//! settles, which nobody sees.
 //!
-//! - A row ends where nothing has been said for [`QUIET_S`]. Evidence that comes later opens
-//!   another one: for the supervisor, too, it makes new what had settled.
+//! - What is new settles in a step with chance q, but not in the step in which it changes. If it
+//!   has not, the step says something with a chance of its action.
+//! - Of what is said a share, the same for all actions, speaks for something else.
+//!
+//! These chances are found by expectation maximisation (Dempster, Laird and Rubin 1977). How many
+//! of the steps after the last evidence were still new is expected from the chances. Then they are
+//! counted anew, until both agree.
+//!
+//! - A row ends where nothing has been said for [`QUIET_S`]: evidence that comes later is news, and
+//!   opens another one.
 //! - How often faults arise, pass and join is not counted: missions for this are drawn with trouble
 //!   in them. Prices are the user's.
 
@@ -25,7 +30,7 @@ const QUIET_S: f64 = 1.0;
 const ROUNDS_MAX: usize = 500;
 /// Chances that change by less are found.
 const CONVERGED: f64 = 1e-9;
-/// A step may end in no more than this with another state, so that other rates have room.
+/// No step settles more often: a step may leave a state once, and other rates need room.
 const SETTLES_MAX: f64 = 0.9;
 
 /// What the evidence of a step speaks for.
@@ -41,6 +46,8 @@ enum Word {
 struct Step {
     action: usize,
     word: Word,
+    /// False in the step in which what is wrong changes.
+    may_settle: bool,
 }
 
 /// Steps in a row, from something new on.
@@ -68,16 +75,61 @@ impl Row {
 /// Chances as they are found.
 #[derive(Debug, Clone, PartialEq)]
 struct Chances {
-    sees: Vec<f64>,
-    confused: f64,
+    /// For each action, that a step says something.
+    says: Vec<f64>,
+    /// That it speaks for something else if it does.
+    other: f64,
+    /// That what is new settles in a step.
     settles: f64,
+}
+
+impl Chances {
+    fn new(parameters: &Parameters) -> Self {
+        let confused = parameters.evidence.confused;
+        let says = |sees: f64| (sees * (1.0 + confused)).min(1.0);
+        let settles = parameters.evidence.settles_1_s * parameters.epoch_s;
+        Self {
+            says: parameters.action.iter().map(|it| says(it.sees)).collect(),
+            other: confused / (1.0 + confused),
+            settles: settles.min(SETTLES_MAX),
+        }
+    }
+
+    /// Writes what was visited into parameters.
+    fn write(&self, counts: &Counts, parameters: &mut Parameters) {
+        let evidence = &mut parameters.evidence;
+        if counts.other.n > 0.0 {
+            // A parameter file allows a ratio of 1.
+            evidence.confused = (self.other / (1.0 - self.other)).min(1.0);
+        }
+        if counts.settles.n > 0.0 {
+            evidence.settles_1_s = self.settles / parameters.epoch_s;
+        }
+        let actions = parameters.action.iter_mut().zip(&self.says);
+        for ((action, says), count) in actions.zip(&counts.says) {
+            if count.n > 0.0 {
+                action.sees = says / (1.0 + evidence.confused);
+            }
+            // What was never visited may leave too little room for what is confused.
+            action.sees = action.sees.min(1.0 / (1.0 + evidence.confused));
+        }
+    }
+
+    fn largest_change(&self, other: &Self) -> f64 {
+        let all = |of: &Self| {
+            let says = of.says.clone().into_iter();
+            says.chain([of.other, of.settles])
+        };
+        let changes = all(self).zip(all(other));
+        changes.fold(0.0, |most, (one, other)| most.max((one - other).abs()))
+    }
 }
 
 /// How often it was so, as expected.
 #[derive(Debug, Clone, Default)]
 struct Counts {
-    sees: Vec<Count>,
-    /// Of all evidence, what speaks for something else.
+    says: Vec<Count>,
+    /// Of all evidence.
     other: Count,
     settles: Count,
 }
@@ -85,7 +137,7 @@ struct Counts {
 impl Counts {
     fn expected(rows: &[Row], chances: &Chances) -> Self {
         let mut counts = Self {
-            sees: vec![Count::default(); chances.sees.len()],
+            says: vec![Count::default(); chances.says.len()],
             ..Self::default()
         };
         for row in rows {
@@ -99,32 +151,35 @@ impl Counts {
 
     /// A step that was still new, by its probability.
     fn add_new(&mut self, step: Step, p: f64) {
-        self.settles.n += p;
-        let sees = &mut self.sees[step.action];
-        sees.n += p;
-        match step.word {
-            Word::None => {}
-            Word::Truth => {
-                sees.k += p;
-                self.other.n += p;
-            }
-            Word::Other => {
-                self.other.k += p;
-                self.other.n += p;
-            }
+        if step.may_settle {
+            self.settles.n += p;
+        }
+        let says = &mut self.says[step.action];
+        says.n += p;
+        if step.word != Word::None {
+            says.k += p;
+            self.other.n += p;
+        }
+        if step.word == Word::Other {
+            self.other.k += p;
         }
     }
 
     /// After the last evidence it settled in one of the steps, or in none.
     fn add_quiet(&mut self, row: &Row, chances: &Chances) {
-        let says = |step: &Step| (chances.sees[step.action] * (1.0 + chances.confused)).min(1.0);
         let mut still_new = 1.0;
         let mut settled = Vec::with_capacity(row.quiet.len());
         for step in &row.quiet {
-            settled.push(still_new * chances.settles);
-            still_new *= (1.0 - chances.settles) * (1.0 - says(step));
+            let settles = if step.may_settle {
+                chances.settles
+            } else {
+                0.0
+            };
+            settled.push(still_new * settles);
+            still_new *= (1.0 - settles) * (1.0 - chances.says[step.action]);
         }
         let sum = still_new + settled.iter().sum::<f64>();
+        // Held impossible by the chances: nothing is expected of it.
         if sum <= 0.0 {
             return;
         }
@@ -140,27 +195,13 @@ impl Counts {
 
     /// The chances that these counts make, with those by hand worth `weight` visits.
     fn chances(&self, by_hand: &Chances, weight: f64) -> Chances {
-        let mean = |p: f64, count: Count| match count.n + weight {
-            sum if sum > 0.0 && p > 0.0 => (count.k + weight * p) / sum,
-            _ => p,
-        };
-        let pairs = by_hand.sees.iter().zip(&self.sees);
+        let says = by_hand.says.iter().zip(&self.says);
         Chances {
-            sees: pairs.map(|(p, count)| mean(*p, *count)).collect(),
-            confused: ratio(mean(share(by_hand.confused), self.other)),
-            settles: mean(by_hand.settles, self.settles).min(SETTLES_MAX),
+            says: says.map(|(p, count)| count.mean(*p, weight)).collect(),
+            other: self.other.mean(by_hand.other, weight),
+            settles: self.settles.mean(by_hand.settles, weight).min(SETTLES_MAX),
         }
     }
-}
-
-/// Of all evidence the share that speaks for something else, from its ratio to the rest.
-fn share(confused: f64) -> f64 {
-    confused / (1.0 + confused)
-}
-
-/// The ratio, of which a parameter file allows 1.
-fn ratio(share: f64) -> f64 {
-    (share / (1.0 - share)).min(1.0)
 }
 
 /// Fits checked parameters to records of the model that they make; what they say counts as `weight`
@@ -178,38 +219,37 @@ pub fn fit(
         .iter()
         .flat_map(|record| rows(parameters, model, record, quiet_max))
         .collect();
-    let by_hand = Chances {
-        sees: parameters.action.iter().map(|it| it.sees).collect(),
-        confused: parameters.evidence.confused,
-        settles: (parameters.evidence.settles_1_s * parameters.epoch_s).min(SETTLES_MAX),
-    };
+    let by_hand = Chances::new(parameters);
     let mut found = by_hand.clone();
     let mut counts = Counts::expected(&rows, &found);
     for _ in 0..ROUNDS_MAX {
         let before = std::mem::replace(&mut found, counts.chances(&by_hand, weight));
         counts = Counts::expected(&rows, &found);
-        if largest_change(&before, &found) < CONVERGED {
+        if found.largest_change(&before) < CONVERGED {
             break;
         }
     }
-    let mut fitted = parameters.clone();
     let mut chances = FittedChances::new(weight);
-    for (action, count) in fitted.action.iter_mut().zip(&counts.sees) {
-        chances.set(format!("{}: sees", action.name), &mut action.sees, *count);
+    let mut set = |key: String, by_hand: f64, count: Count| {
+        let mut chance = by_hand;
+        chances.set(key, &mut chance, count);
+    };
+    let says = parameters.action.iter().zip(&by_hand.says);
+    for ((action, says), count) in says.zip(&counts.says) {
+        set(format!("{}: says something", action.name), *says, *count);
     }
-    let mut other = share(by_hand.confused);
-    let key = "evidence: confused, of all that speaks";
-    chances.set(key.to_owned(), &mut other, counts.other);
-    let mut settles = by_hand.settles;
-    let key = "evidence: settles in a step";
-    chances.set(key.to_owned(), &mut settles, counts.settles);
-    fitted.evidence.confused = ratio(other);
-    fitted.evidence.settles_1_s = settles.min(SETTLES_MAX) / parameters.epoch_s;
-    // Each is counted apart: together they may say more than always.
-    let sees_max = 1.0 / (1.0 + fitted.evidence.confused);
-    for action in &mut fitted.action {
-        action.sees = action.sees.min(sees_max);
-    }
+    set(
+        "speaks for something else".to_owned(),
+        by_hand.other,
+        counts.other,
+    );
+    set(
+        "settles in a step".to_owned(),
+        by_hand.settles,
+        counts.settles,
+    );
+    let mut fitted = parameters.clone();
+    found.write(&counts, &mut fitted);
     Fit {
         chances: chances.finish(),
         steps: rows
@@ -220,36 +260,35 @@ pub fn fit(
     }
 }
 
-fn largest_change(before: &Chances, after: &Chances) -> f64 {
-    let numbers = |of: &Chances| {
-        let sees = of.sees.clone().into_iter();
-        sees.chain([of.confused, of.settles])
-    };
-    let changes = numbers(before).zip(numbers(after));
-    changes.fold(0.0, |most, (one, other)| most.max((one - other).abs()))
-}
-
 /// The rows of a record. A standing robot shows nothing, and what is wrong stays as it is.
 fn rows(parameters: &Parameters, model: &Pomdp, record: &Record, quiet_max: usize) -> Vec<Row> {
     let mut rows = Vec::new();
     let mut row = Row::default();
-    let mut condition = None;
+    let condition_of = |label: &Option<u32>| {
+        let name = model.states().get((*label)? as usize)?;
+        let name = name.strip_suffix(NEW).unwrap_or(name);
+        // The end of a task is never new.
+        let is_ever_new = model.states().contains(&format!("{name}{NEW}"));
+        is_ever_new.then_some(name)
+    };
+    let mut condition = record.labels.first().and_then(condition_of);
     let taken = record.actions.iter().zip(&record.observations);
     for ((action, observation), label) in taken.zip(record.labels.iter().skip(1)) {
-        let state = label.and_then(|state| model.states().get(state as usize));
-        let name = state.map(|name| name.strip_suffix(NEW).unwrap_or(name));
-        // The end of a task is never new.
-        let name = name.filter(|name| model.states().contains(&format!("{name}{NEW}")));
-        if name != condition {
+        let name = condition_of(label);
+        let has_changed = name != condition;
+        if has_changed {
             rows.push(std::mem::take(&mut row));
-            condition = name;
         }
+        // Of an alarm that rises it is known that something may be new, and not since when.
+        let may_settle = !has_changed || condition.is_none();
+        condition = name;
         let (Some(name), Some(action)) = (name, moving(parameters, model, *action)) else {
             continue;
         };
         let said = model.observations().get(*observation as usize);
         let step = Step {
             action,
+            may_settle,
             word: match said.and_then(|said| said.strip_suffix(NEW)) {
                 None => Word::None,
                 Some(said) if said == name => Word::Truth,

@@ -87,7 +87,7 @@ fn actions_differ_in_more_than_what_a_step_costs() {
     assert_eq!(model.likelihood(go, settled)[state(&model, "UNKNOWN")], 1.0);
     assert_eq!(
         model.likelihood(go, seen("STUCK_NEW"))[state(&model, "STUCK_NEW")],
-        0.79
+        0.82
     );
 }
 
@@ -103,8 +103,8 @@ fn a_step_is_made_of_the_rates_and_prices_of_the_file() {
     // 0.02 /s and 0.002 /s in 0.1 s, four fifths of these drivable, and 1.1 cm of 9 m.
     assert!((to("ND_NEW") - 0.002).abs() < 1e-12 && (to("SEVERAL_NEW") - 0.00004).abs() < 1e-12);
     assert!((to("SEVERAL_DRIVABLE_NEW") - 0.00016).abs() < 1e-12);
-    // Evidence ends 3.8 times a second.
-    assert!((to("STUCK") - 0.38).abs() < 1e-12);
+    // Evidence ends 4.5 times a second.
+    assert!((to("STUCK") - 0.45).abs() < 1e-12);
     assert!((to("DONE") - 0.22 * 0.5 * 0.1 / 9.0).abs() < 1e-12);
     // Half of 200 a metre for 1.1 cm, and a tenth of a second.
     let price = |s: usize, a: &str| -model.reward(s, action(&model, a));
@@ -170,23 +170,30 @@ fn evidence_is_counted_where_it_may_come() {
         let chance = found.chances.iter().find(|chance| chance.key == key);
         chance.map(|chance| (chance.count, chance.visits, chance.fitted))
     };
-    assert_eq!(chance(0.0, "go_on: sees"), Some((1.0, 2.0, 0.5)));
-    assert_eq!(chance(0.0, "slow_down: sees"), Some((1.0, 2.0, 0.5)));
-    assert_eq!(chance(0.0, "stop: sees"), None);
-    assert_eq!(chance(0.0, "compensate: sees"), None);
-    let confused = chance(0.0, "evidence: confused, of all that speaks");
-    assert_eq!(confused, Some((1.0, 3.0, 1.0 / 3.0)));
+    assert_eq!(chance(0.0, "go_on: says something"), Some((1.0, 2.0, 0.5)));
     assert_eq!(
-        chance(0.0, "evidence: settles in a step"),
-        Some((0.0, 4.0, 0.0))
+        chance(0.0, "slow_down: says something"),
+        Some((2.0, 2.0, 1.0))
     );
+    assert_eq!(chance(0.0, "stop: says something"), None);
+    assert_eq!(chance(0.0, "compensate: says something"), None);
+    let confused = chance(0.0, "speaks for something else");
+    assert_eq!(confused, Some((1.0, 3.0, 1.0 / 3.0)));
+    assert_eq!(chance(0.0, "settles in a step"), Some((0.0, 4.0, 0.0)));
     let found = fit(&parameters, &model, &records, 0.0);
     assert_eq!(found.steps, 4);
     // One word of something else for two of the truth.
     assert!((found.parameters.evidence.confused - 0.5).abs() < 1e-12);
+    // It speaks in half of the steps, and for the truth in two of three words.
+    assert!((found.parameters.action[0].sees - 1.0 / 3.0).abs() < 1e-12);
+    // What was never visited stays as it was, if what is confused leaves room for it.
+    let never = found.parameters.action[3].sees;
+    assert_eq!(never, parameters.action[3].sees.min(1.0 / 1.5));
     // What is thought by hand counts as so many visits.
-    let (by_hand, weighted) = (parameters.action[0].sees, chance(6.0, "go_on: sees"));
-    assert_eq!(weighted, Some((1.0, 2.0, (1.0 + 6.0 * by_hand) / 8.0)));
+    let by_hand = parameters.action[0].sees * (1.0 + parameters.evidence.confused);
+    let (k, n, p) = chance(6.0, "go_on: says something").unwrap();
+    assert_eq!((k, n), (1.0, 2.0));
+    assert!((p - (1.0 + 6.0 * by_hand) / 8.0).abs() < 1e-12);
     // Every fit is a model, and can be written.
     Pomdp::parse(&generate(&found.parameters).unwrap()).unwrap();
     let text = toml::to_string(&found.parameters).unwrap();
@@ -218,14 +225,26 @@ fn what_is_quiet_may_have_settled() {
             "{k} {n}"
         );
     };
-    near(chance("evidence: settles in a step"), (0.5, 1.0));
-    near(chance("go_on: sees"), (0.0, 0.5));
+    near(chance("settles in a step"), (0.5, 1.0));
+    near(chance("go_on: says something"), (0.0, 0.5));
     // After a second of silence no more is waited for, and what then comes opens another row.
     let mut steps = vec![("go_on", "STUCK_NEW", stuck)];
     steps.extend([("go_on", "none", stuck); 30]);
     steps.extend([("go_on", "STUCK_NEW", stuck); 2]);
     let found = fit(&parameters, &model, &[record(&model, &steps)], 0.0);
     assert_eq!(found.steps, 1 + 10 + 1);
+    // What changes is new, and does not settle in that step.
+    let (nothing, told) = (
+        ("go_on", "ND_NEW", Some("ND_NEW")),
+        ("go_on", "STUCK_NEW", stuck),
+    );
+    let changed = [record(&model, &[nothing, nothing, told, told])];
+    let found = fit(&parameters, &model, &changed, 0.0);
+    let settles = found
+        .chances
+        .iter()
+        .find(|it| it.key == "settles in a step");
+    assert_eq!(settles.map(|it| (it.count, it.visits)), Some((0.0, 3.0)));
 }
 
 /// One action for ever.
@@ -309,8 +328,8 @@ fn the_solved_policy_calls_where_qmdp_waits_for_ever() {
         (&[("ND", 1.0)][..], "go_on"),
         (&[("STUCK", 1.0)], "compensate"),
         (&[("STUCK_NEW", 1.0)], "compensate"),
-        // The doubt may yet be resolved.
-        (&[("STUCK_NEW", 0.75), ("UNKNOWN_NEW", 0.25)], "compensate"),
+        // The doubt may yet be resolved: no call.
+        (&[("STUCK_NEW", 0.75), ("UNKNOWN_NEW", 0.25)], "slow_down"),
         (&[("ENCODER", 1.0)], "ignore_encoder"),
         (&[("SEVERAL", 1.0)], "call_for_help"),
         (&[("SEVERAL_DRIVABLE", 1.0)], "limp_home"),

@@ -82,6 +82,8 @@ fn run_for<P: DeserializeOwned + Serialize, E: Display>(
         let problem = "no step with known states: allowed are missions with 'states'";
         return Err(CommandError::usage(format!("{missions}: {problem}")));
     }
+    // What is written makes a model.
+    generate(&parameters).map_err(|e| file.refused(&format!("fitted: {e}")))?;
     let document = Document {
         schema_version: 1,
         parameters_file: args.parameters.display().to_string(),
@@ -104,7 +106,7 @@ fn text_of(document: &Document) -> String {
     let width = width.unwrap_or(0);
     let mut lines = vec![
         format!(
-            "{} records of missions, {} steps with known states",
+            "{} records of missions, {} steps counted",
             document.missions, document.steps
         ),
         format!("{:width$}  by hand  fitted  95 %            counted", ""),

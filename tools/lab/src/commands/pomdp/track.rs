@@ -14,8 +14,8 @@ use vigil_terminal::{CommandError, Outcome};
 /// Prints the belief after each action and observation.
 ///
 /// After an impossible observation the belief is the prediction with 0.01 of the start belief mixed
-/// in, and the exit code is 1. With a policy the action that it chooses at each belief follows,
-/// with the value of the runner-up below its own.
+/// in, and the exit code is 1. With a policy the action that it chooses at each belief follows, and
+/// by how much it is worth more than the runner-up.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model (.pomdp or .pomdpx).
