@@ -225,8 +225,8 @@ fn say(archive: &mut Archive, args: &Args, found: &[Measurement]) {
     archive.say(&format!(
         "Bounds of the best value after {} s of processor time, or a gap of {PRECISION:e}. The \
          policy has {VECTORS_MAX} vectors at most; z is by how many standard errors it earned more \
-         than its lower bound in {} simulated missions, fewer at high discounts. These last until {DISCOUNT_LEFT} of the \
-         discount is left, at most {STEPS_MAX} steps.\n",
+         than its lower bound in {} simulated missions, fewer at high discounts. These last until \
+         {DISCOUNT_LEFT} of the discount is left, at most {STEPS_MAX} steps.\n",
         args.seconds, args.episodes
     ));
     archive.say("| model | lower | upper | gap | APPL's gap | s | vectors | z |");
