@@ -9,7 +9,7 @@ use statrs::distribution::{Beta, ContinuousCDF};
 /// A number that was fitted.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct FittedChance {
-    /// Where it stands in the file.
+    /// Where it stands in the file, or what it is a chance of.
     pub key: String,
     /// What it was.
     pub by_hand: f64,
@@ -79,29 +79,34 @@ impl FittedChances {
         }
     }
 
-    /// Sets a chance that is not ruled out to what the counts make of it.
-    pub(crate) fn set(&mut self, key: String, chance: &mut f64, count: Count) {
-        let by_hand = *chance;
+    /// What the counts make of a chance, if it is not ruled out.
+    pub(crate) fn fit_chance(&mut self, key: String, by_hand: f64, count: Count) -> f64 {
         if by_hand <= 0.0 || count.n == 0.0 {
-            return;
+            return by_hand;
         }
         let (yes, no) = (
             count.k + self.weight * by_hand,
             count.n - count.k + self.weight * (1.0 - by_hand),
         );
-        *chance = count.mean(by_hand, self.weight);
+        let fitted = count.mean(by_hand, self.weight);
         let bound = |p| match Beta::new(yes, no) {
             Ok(beta) => beta.inverse_cdf(p),
-            Err(_) => *chance,
+            Err(_) => fitted,
         };
         self.chances.push(FittedChance {
             key,
             by_hand,
-            fitted: *chance,
+            fitted,
             interval: [bound(0.025), bound(0.975)],
             count: count.k,
             visits: count.n,
         });
+        fitted
+    }
+
+    /// Sets a chance to it.
+    pub(crate) fn set(&mut self, key: String, chance: &mut f64, count: Count) {
+        *chance = self.fit_chance(key, *chance, count);
     }
 
     pub(crate) fn finish(self) -> Vec<FittedChance> {

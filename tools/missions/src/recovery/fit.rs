@@ -230,24 +230,13 @@ pub fn fit(
         }
     }
     let mut chances = FittedChances::new(weight);
-    let mut set = |key: String, by_hand: f64, count: Count| {
-        let mut chance = by_hand;
-        chances.set(key, &mut chance, count);
-    };
     let says = parameters.action.iter().zip(&by_hand.says);
     for ((action, says), count) in says.zip(&counts.says) {
-        set(format!("{}: says something", action.name), *says, *count);
+        chances.fit_chance(format!("{}: says something", action.name), *says, *count);
     }
-    set(
-        "speaks for something else".to_owned(),
-        by_hand.other,
-        counts.other,
-    );
-    set(
-        "settles in a step".to_owned(),
-        by_hand.settles,
-        counts.settles,
-    );
+    let (other, settles) = (by_hand.other, by_hand.settles);
+    chances.fit_chance("speaks for something else".to_owned(), other, counts.other);
+    chances.fit_chance("settles in a step".to_owned(), settles, counts.settles);
     let mut fitted = parameters.clone();
     found.write(&counts, &mut fitted);
     Fit {

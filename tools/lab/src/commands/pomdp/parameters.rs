@@ -34,12 +34,9 @@ impl ParameterFile {
     /// # Errors
     /// A file that cannot be read, or does not say what it is for.
     pub(super) fn read(path: &Path) -> Result<Self, CommandError> {
-        let text = fs::read_to_string(path).map_err(|error| {
-            CommandError::usage(format!("{}: cannot be read: {error}", path.display()))
-        })?;
-        let head: Result<Head, _> = toml::from_str(&text);
-        let head =
-            head.map_err(|error| CommandError::usage(format!("{}: {error}", path.display())))?;
+        let text = fs::read_to_string(path)
+            .map_err(|error| refused(path, &format!("cannot be read: {error}")))?;
+        let head: Head = toml::from_str(&text).map_err(|error| refused(path, &error))?;
         Ok(Self {
             path: path.to_owned(),
             text,
@@ -57,6 +54,10 @@ impl ParameterFile {
 
     /// Why the file is refused.
     pub(super) fn refused(&self, problem: &dyn Display) -> CommandError {
-        CommandError::usage(format!("{}: {problem}", self.path.display()))
+        refused(&self.path, problem)
     }
+}
+
+fn refused(path: &Path, problem: &dyn Display) -> CommandError {
+    CommandError::usage(format!("{}: {problem}", path.display()))
 }
