@@ -550,6 +550,48 @@ VIGIL_ASSERT(offsetof(vigil_action, step_count) == 992);
 VIGIL_ASSERT(offsetof(vigil_action, step_action) == 1000);
 VIGIL_ASSERT(offsetof(vigil_action, step_observation) == 1004);
 
+#define VIGIL_TRUTH_SCHEMA 0x31e8fd77ede8c9adull
+#define VIGIL_TRUTH_TYPE_NAME "vigil.Truth.v1.31e8fd77ede8c9ad"
+typedef struct {
+  /* Common header. */
+  vigil_header header;
+  /* The frame of this instant. */
+  vigil_cause cause;
+  /* Run of that frame. */
+  uint64_t run_id;
+  /* Pose in the world: x m, y m, yaw rad (not wrapped). */
+  double pose[3];
+  /* Velocity of the body: forward m/s, lateral m/s, yaw rad/s. */
+  double velocity[3];
+  /* What was obeyed since the frame before: a RecoveryKind; 0 if no action was valid. */
+  uint32_t obeyed;
+  /* See Action::stuck_wheels, of the obeyed action. */
+  uint16_t stuck_wheels;
+  /* See Action::broken_encoders, of the obeyed action. */
+  uint16_t broken_encoders;
+  /* 1 while a fault or disturbance is in force. */
+  uint32_t is_disturbed;
+  /* 1 while something is within the bumper's reach. */
+  uint32_t touches;
+  /* 1 once the navigation holds its goal for reached. */
+  uint32_t at_goal;
+  /* Reserved, zero. */
+  uint32_t reserved;
+} vigil_truth;
+VIGIL_ASSERT(sizeof(vigil_truth) == 152);
+VIGIL_ASSERT(offsetof(vigil_truth, header) == 0);
+VIGIL_ASSERT(offsetof(vigil_truth, cause) == 48);
+VIGIL_ASSERT(offsetof(vigil_truth, run_id) == 72);
+VIGIL_ASSERT(offsetof(vigil_truth, pose) == 80);
+VIGIL_ASSERT(offsetof(vigil_truth, velocity) == 104);
+VIGIL_ASSERT(offsetof(vigil_truth, obeyed) == 128);
+VIGIL_ASSERT(offsetof(vigil_truth, stuck_wheels) == 132);
+VIGIL_ASSERT(offsetof(vigil_truth, broken_encoders) == 134);
+VIGIL_ASSERT(offsetof(vigil_truth, is_disturbed) == 136);
+VIGIL_ASSERT(offsetof(vigil_truth, touches) == 140);
+VIGIL_ASSERT(offsetof(vigil_truth, at_goal) == 144);
+VIGIL_ASSERT(offsetof(vigil_truth, reserved) == 148);
+
 #define VIGIL_HEALTH_SCHEMA 0x22ca8e52d533df67ull
 #define VIGIL_HEALTH_TYPE_NAME "vigil.Health.v1.22ca8e52d533df67"
 typedef struct {

@@ -608,6 +608,57 @@ assert Action.step_action.offset == 1000
 assert Action.step_observation.offset == 1004
 
 
+class Truth(ctypes.LittleEndianStructure):
+    SCHEMA = 0x31E8FD77EDE8C9AD
+    TYPE_NAME = "vigil.Truth.v1.31e8fd77ede8c9ad"
+
+    @staticmethod
+    def type_name():
+        return Truth.TYPE_NAME
+
+    _fields_ = [
+        # Common header.
+        ("header", Header),
+        # The frame of this instant.
+        ("cause", Cause),
+        # Run of that frame.
+        ("run_id", ctypes.c_uint64),
+        # Pose in the world: x m, y m, yaw rad (not wrapped).
+        ("pose", ctypes.c_double * 3),
+        # Velocity of the body: forward m/s, lateral m/s, yaw rad/s.
+        ("velocity", ctypes.c_double * 3),
+        # What was obeyed since the frame before: a RecoveryKind; 0 if no action was valid.
+        ("obeyed", ctypes.c_uint32),
+        # See Action::stuck_wheels, of the obeyed action.
+        ("stuck_wheels", ctypes.c_uint16),
+        # See Action::broken_encoders, of the obeyed action.
+        ("broken_encoders", ctypes.c_uint16),
+        # 1 while a fault or disturbance is in force.
+        ("is_disturbed", ctypes.c_uint32),
+        # 1 while something is within the bumper's reach.
+        ("touches", ctypes.c_uint32),
+        # 1 once the navigation holds its goal for reached.
+        ("at_goal", ctypes.c_uint32),
+        # Reserved, zero.
+        ("reserved", ctypes.c_uint32),
+    ]
+
+
+assert ctypes.sizeof(Truth) == 152
+assert Truth.header.offset == 0
+assert Truth.cause.offset == 48
+assert Truth.run_id.offset == 72
+assert Truth.pose.offset == 80
+assert Truth.velocity.offset == 104
+assert Truth.obeyed.offset == 128
+assert Truth.stuck_wheels.offset == 132
+assert Truth.broken_encoders.offset == 134
+assert Truth.is_disturbed.offset == 136
+assert Truth.touches.offset == 140
+assert Truth.at_goal.offset == 144
+assert Truth.reserved.offset == 148
+
+
 class Health(ctypes.LittleEndianStructure):
     SCHEMA = 0x22CA8E52D533DF67
     TYPE_NAME = "vigil.Health.v1.22ca8e52d533df67"

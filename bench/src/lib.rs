@@ -4,6 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
+use toml::Table;
 use vigil_setup::{Setup, SetupError, load_graph};
 
 pub mod archive;
@@ -47,6 +48,26 @@ pub fn root() -> PathBuf {
 /// A configuration that is refused.
 pub fn load(file: impl AsRef<Path>) -> Result<Setup, SetupError> {
     load_graph(&root().join("config").join(file), |_| {})
+}
+
+/// Makes a graph file of `config/` one that may lie anywhere: it names its models by full paths.
+///
+/// # Errors
+/// One without models.
+pub fn find_models(file: &mut Table) -> Result<(), Box<dyn Error>> {
+    let config = root().join("config");
+    let full = |path: &mut toml::Value| {
+        let name = path.as_str().unwrap_or_default();
+        *path = config.join(name).display().to_string().into();
+    };
+    let files = file.get_mut("files").and_then(toml::Value::as_table_mut);
+    let files = files.ok_or("no [files]")?;
+    files.iter_mut().for_each(|(_, path)| full(path));
+    let policy = file
+        .get_mut("supervisor")
+        .and_then(|it| it.get_mut("policy_file"));
+    policy.into_iter().for_each(full);
+    Ok(())
 }
 
 /// What `work` makes of a folder of its own, which is gone afterwards.

@@ -28,7 +28,7 @@ use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::machine;
 use vigil_bench::variation::{Comparison, say_comparisons, without_lead};
-use vigil_evaluation::parallel::in_parallel;
+use vigil_evaluation::parallel::at_once;
 use vigil_missions::learning::{Record, file};
 use vigil_pomdp::Pomdp;
 
@@ -118,6 +118,16 @@ fn drive_all<P: Sync, M: Send>(
     plans: &[P],
     drive: impl Fn(&P) -> Result<M, Box<dyn Error>> + Sync,
 ) -> Result<Vec<M>, Box<dyn Error>> {
+    let cores = std::thread::available_parallelism()?.get();
+    drive_at_once(cores, plans, drive)
+}
+
+/// Every mission, so many at once, with progress on standard error.
+fn drive_at_once<P: Sync, M: Send>(
+    workers: usize,
+    plans: &[P],
+    drive: impl Fn(&P) -> Result<M, Box<dyn Error>> + Sync,
+) -> Result<Vec<M>, Box<dyn Error>> {
     let (began, done) = (Instant::now(), AtomicUsize::new(0));
     let drive = |plan: &P| {
         let mission = drive(plan).map_err(|e| e.to_string());
@@ -128,7 +138,7 @@ fn drive_all<P: Sync, M: Send>(
         }
         mission
     };
-    let missions: Result<Vec<M>, String> = in_parallel(plans, drive).into_iter().collect();
+    let missions: Result<Vec<M>, String> = at_once(workers, plans, drive).into_iter().collect();
     Ok(missions?)
 }
 

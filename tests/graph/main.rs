@@ -16,3 +16,4 @@ mod killing;
 mod playback;
 mod realtime;
 mod recount;
+mod truth;

@@ -5,14 +5,13 @@ use std::error::Error;
 use vigil_blocks::{Action, RecoveryKind, SensorFrame};
 use vigil_missions::learning::Record;
 use vigil_robot::Injection;
-use vigil_robot::kinematics::wrap_angle;
 use vigil_sensor_sim::{NavigatorEvent, SensorSource, Simulation};
 use vigil_setup::Setup;
 
 use super::commander::{CorridorArm, CorridorCommander};
 use super::plan::CorridorPlan;
 use super::recording::StepRecorder;
-use super::score::{CorridorScore, Step, Tally};
+use super::score::{CorridorScore, Step, Tally, pose_error};
 use super::{CorridorGraph, LIMIT_S};
 use crate::missions::{PresentFault, order};
 
@@ -45,7 +44,7 @@ pub fn drive(
     })
 }
 
-fn setup_of(graph: &CorridorGraph, plan: &CorridorPlan) -> Setup {
+pub(super) fn setup_of(graph: &CorridorGraph, plan: &CorridorPlan) -> Setup {
     let mut setup = graph.setup.clone();
     setup.file.navigation = Some(plan.navigation.clone());
     setup.file.simulator = plan.simulator.clone();
@@ -96,12 +95,6 @@ impl<'a> Field<'a> {
 
     fn pose(&self) -> [f64; 3] {
         self.simulation.world.true_state().pose
-    }
-
-    fn off_goal_m(&self) -> f64 {
-        let goal = self.plan.navigation.path.last().copied();
-        let [x, y, _] = self.pose();
-        goal.map_or(f64::INFINITY, |goal| (goal[0] - x).hypot(goal[1] - y))
     }
 }
 
@@ -156,8 +149,6 @@ fn ride(
             .step(dt_s, Some(action), frame.header.t_capture_ns);
         field.simulation.measure(&mut frame);
         let pose = field.pose();
-        // The channels begin with the pose; where one is not measured, its error is not known.
-        let error = |at: usize| frame.channel[at] - pose[at];
         tally.add(
             &graph.file.prices,
             &graph.faults,
@@ -165,14 +156,14 @@ fn ride(
                 faults: &field.faults,
                 obeyed,
                 moved_m: (pose[0] - before[0]).hypot(pose[1] - before[1]),
-                pose_error: [error(0), error(1), wrap_angle(error(2))],
+                pose_error: pose_error(&frame, pose),
                 touches: field.simulation.touches(),
                 planned_m_s: plan.navigation.speed_m_s,
                 dt_s,
             },
         );
         if let Some(NavigatorEvent::Goal) = field.simulation.take_event() {
-            tally.arrive(&graph.file.prices, field.off_goal_m());
+            tally.arrive(&graph.file.prices, plan.off_goal_m(pose));
             break;
         }
         // Help has mended the hardware; a place that was found has not.

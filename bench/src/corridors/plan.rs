@@ -95,6 +95,13 @@ impl CorridorPlan {
         }
     }
 
+    /// How far a pose is from the end of the way, m.
+    #[must_use]
+    pub fn off_goal_m(&self, [x, y, _]: [f64; 3]) -> f64 {
+        let goal = self.navigation.path.last();
+        goal.map_or(f64::INFINITY, |goal| (goal[0] - x).hypot(goal[1] - y))
+    }
+
     /// What it is about.
     #[must_use]
     pub fn group(&self) -> Group {

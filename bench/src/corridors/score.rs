@@ -1,6 +1,7 @@
 //! What a mission in a corridor brought.
 
-use vigil_blocks::RecoveryKind;
+use vigil_blocks::{RecoveryKind, SensorFrame};
+use vigil_robot::kinematics::wrap_angle;
 
 use super::prices::CorridorPrices;
 use crate::missions::{Measure, PresentFault, Prices, RuleOutput, measure, price_1_m};
@@ -24,6 +25,13 @@ pub(super) struct Step<'a> {
     /// Speed that the path is planned with, m/s.
     pub planned_m_s: f64,
     pub dt_s: f64,
+}
+
+/// The pose of a frame less the true one, m, m, rad. The channels begin with the pose; where one is
+/// not measured, its error is not known.
+pub(super) fn pose_error(frame: &SensorFrame, pose: [f64; 3]) -> [f64; 3] {
+    let error = |at: usize| frame.channel[at] - pose[at];
+    [error(0), error(1), wrap_angle(error(2))]
 }
 
 /// What an order does about a fault: a manoeuvre about a wheel is driven with counter-steering.

@@ -14,7 +14,7 @@ use vigil_cycle::{CycleStamps, PortError, stamps};
 use vigil_setup::Setup;
 
 use crate::chain::{STAGE_NAMES, STAGES};
-use crate::root;
+use crate::{find_models, root};
 
 /// What is changed in the default graph.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,11 +70,7 @@ impl GraphFile {
         if change.is_faulty {
             set(&mut file, "identifier", "filter", "hierarchical".into())?;
         }
-        let files = file.get_mut("files").and_then(toml::Value::as_table_mut);
-        for (_, path) in files.ok_or("no [files]")?.iter_mut() {
-            let name = path.as_str().unwrap_or_default();
-            *path = config.join(name).display().to_string().into();
-        }
+        find_models(&mut file)?;
         if !change.is_fifo {
             for service in STAGE_NAMES {
                 let services = file.get_mut("services").and_then(|s| s.get_mut(service));

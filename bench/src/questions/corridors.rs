@@ -7,11 +7,13 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde_json::json;
-use vigil_bench::corridors::{self, CorridorArm, CorridorGraph, CorridorPlan, EscalationSettings};
+use vigil_bench::corridors::{
+    self, CorridorArm, CorridorGraph, CorridorPlan, EscalationSettings, LiveComparison,
+};
 use vigil_bench::tuning::tune;
 use vigil_bench::variation::Variation;
 
-use super::{MissionArgs, demand_none, drive_all, share, write_records};
+use super::{MissionArgs, demand_none, drive_all, drive_at_once, share, write_records};
 
 /// Which missions.
 #[derive(Debug, clap::Args)]
@@ -29,6 +31,12 @@ pub struct Args {
     /// Share of the decisions that are recorded in which something else is tried.
     #[arg(long, value_name = "P", default_value_t = 0.3, value_parser = share, requires = "record")]
     tried: f64,
+    /// Drive each mission through the four processes too, in real time.
+    #[arg(long, conflicts_with_all = ["sweep", "vary", "record"])]
+    live: bool,
+    /// Live graphs that run beside each other.
+    #[arg(long, value_name = "N", default_value_t = 8, requires = "live")]
+    at_once: usize,
     #[command(flatten)]
     common: MissionArgs,
 }
@@ -45,6 +53,9 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let plans = graph.plans(args.missions, args.common.first_seed());
     if let Some(path) = &args.record {
         return record(args, &graph, &plans, path);
+    }
+    if args.live {
+        return live(args, &graph, &plans);
     }
     match args.common.sweep {
         true => sweep(args, &graph, &plans),
@@ -65,6 +76,24 @@ fn measure(
     let common = &args.common;
     common.keep("corridors", document, began, Some(lines), say)?;
     demand_none(&corridors::shortfalls(&arms, &missions))
+}
+
+/// Vigil through four processes, beside itself and the ladder within one.
+fn live(args: &Args, graph: &CorridorGraph, plans: &[CorridorPlan]) -> Result<(), Box<dyn Error>> {
+    let (began, at_once) = (Instant::now(), args.at_once.max(1));
+    let arms = [CorridorArm::Vigil, CorridorArm::Ladder(graph.file.ladder)];
+    let simulated = drive_all(plans, |plan| corridors::drive(graph, plan, &arms))?;
+    let live = drive_at_once(at_once, plans, |plan| corridors::drive_live(graph, plan))?;
+    let comparison = LiveComparison {
+        live: &live,
+        simulated: &simulated,
+    };
+    let document = comparison.document();
+    let common = &args.common;
+    common.keep("corridors-live", document, began, None, |archive| {
+        comparison.say(archive, at_once);
+    })?;
+    demand_none(&comparison.shortfalls())
 }
 
 /// Vigil and the ladder in every variation.

@@ -41,6 +41,11 @@ impl ActiveDisturbances {
         }
     }
 
+    /// True while there is one.
+    pub(crate) fn is_any(&self) -> bool {
+        self.parameters.iter().flatten().any(Option::is_some)
+    }
+
     /// First parameter of a kind at a place, if it is active.
     pub(crate) fn at(&self, kind: DisturbanceKind, place: usize) -> Option<f64> {
         self.parameters[kind.index()]

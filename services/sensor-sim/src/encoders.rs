@@ -40,6 +40,11 @@ impl Encoders {
         self.fault[wheel] = fault;
     }
 
+    /// True while one is broken.
+    pub(crate) fn is_broken(&self) -> bool {
+        self.fault.iter().any(Option::is_some)
+    }
+
     /// Advances the drifts by `dt_s`.
     pub(crate) fn advance(&mut self, dt_s: f64, active: &ActiveDisturbances) {
         for (wheel, drifted) in self.drifted_rad_s.iter_mut().enumerate() {

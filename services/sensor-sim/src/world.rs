@@ -315,6 +315,12 @@ impl World {
         }
     }
 
+    /// True while a fault or disturbance is in force.
+    #[must_use]
+    pub fn is_disturbed(&self) -> bool {
+        self.stuck.contains(&true) || self.encoders.is_broken() || self.active.is_any()
+    }
+
     /// Changes mean friction coefficient and shear modulus during the drive. The scatter about them
     /// stays.
     ///

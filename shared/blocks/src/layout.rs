@@ -66,7 +66,9 @@ pub(crate) use part;
 #[cfg(test)]
 mod tests {
     use super::Layout;
-    use crate::{Action, DetectionBelief, FaultBelief, Header, Health, ParticleBlock, SensorFrame};
+    use crate::{
+        Action, DetectionBelief, FaultBelief, Header, Health, ParticleBlock, SensorFrame, Truth,
+    };
 
     #[test]
     fn fields_follow_each_other_without_gaps() {
@@ -86,5 +88,6 @@ mod tests {
         check::<FaultBelief>();
         check::<Action>();
         check::<Health>();
+        check::<Truth>();
     }
 }

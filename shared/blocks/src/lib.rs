@@ -15,6 +15,7 @@ mod particles;
 mod rejection;
 mod sensor;
 mod size_kind;
+mod truth;
 mod verdict;
 mod weighing;
 
@@ -39,5 +40,6 @@ pub use particles::{HealthyBelief, PARTICLE_CAPACITY, ParticleBlock, WeightedHyp
 pub use rejection::{REJECTIONS, Rejection};
 pub use sensor::{ActionOutcome, CHANNELS, COMMANDS, SensorFrame, Symptoms, WHEELS};
 pub use size_kind::SizeKind;
+pub use truth::Truth;
 pub use verdict::{NAME_SIZE, Verdict, fixed_name};
 pub use weighing::Weighing;

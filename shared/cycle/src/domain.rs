@@ -20,7 +20,7 @@ use crate::topic::{ServiceName, Topic};
 /// Version of the transport, as the workspace's manifest demands it.
 const TRANSPORT_VERSION: &str = "0.10.0";
 /// Sensor frames are small, and a publisher that was held up sends many at once: so many times
-/// more of them may wait.
+/// more of them may wait, with what was true of each.
 const SENSOR_BUFFERS: usize = 8;
 
 /// Characters of a start's name, and how many there are.
@@ -322,10 +322,10 @@ pub fn shared_memory_free_bytes() -> Option<u64> {
 }
 
 impl Queues {
-    /// The sizes of one topic's queues: sensor frames may wait eight times as many.
+    /// The sizes of one topic's queues: of sensor frames and truths eight times as many may wait.
     #[must_use]
     pub const fn for_topic(mut self, topic: Topic) -> Self {
-        if matches!(topic, Topic::Sensor) {
+        if matches!(topic, Topic::Sensor | Topic::Truth) {
             self.buffer *= SENSOR_BUFFERS;
         }
         self

@@ -15,6 +15,8 @@ pub enum Topic {
     DiagnosisParticles,
     /// The supervisor's action.
     Action,
+    /// What is true of a simulated robot.
+    Truth,
     /// Health of a service.
     Health(ServiceName),
     /// Commands to a service.
@@ -77,6 +79,7 @@ impl Topic {
             Self::Diagnosis => format!("vigil/{graph}/diagnosis"),
             Self::DiagnosisParticles => format!("vigil/{graph}/diagnosis/particles"),
             Self::Action => format!("vigil/{graph}/action"),
+            Self::Truth => format!("vigil/{graph}/truth"),
             Self::Health(service) => format!("vigil/{graph}/health/{}", service.as_str()),
             Self::Control(service) => format!("vigil/{graph}/control/{}", service.as_str()),
         }

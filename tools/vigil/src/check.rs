@@ -5,7 +5,7 @@ use std::fs;
 
 use serde::Serialize;
 use vigil_blocks::{
-    Action, Control, DetectionBelief, FaultBelief, Health, ParticleBlock, SensorFrame,
+    Action, Control, DetectionBelief, FaultBelief, Health, ParticleBlock, SensorFrame, Truth,
 };
 use vigil_cycle::Topic;
 use vigil_cycle::domain::shared_memory_free_bytes;
@@ -206,7 +206,7 @@ fn preemption() -> Finding {
 fn shared_memory(setup: &Setup) -> Finding {
     let queues = setup.file.transport;
     let frames = queues.for_topic(Topic::Sensor);
-    let frames = frames.reserved_bytes(size_of::<SensorFrame>());
+    let frames = frames.reserved_bytes(size_of::<SensorFrame>() + size_of::<Truth>());
     let sizes = [
         size_of::<DetectionBelief>(),
         2 * size_of::<ParticleBlock>(),

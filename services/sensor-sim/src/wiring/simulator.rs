@@ -1,6 +1,9 @@
 //! The simulated rover as the source of the graph.
 
-use vigil_blocks::{ActionRejection, Block, Control, ControlCommand, EventKind, SensorFrame};
+use vigil_blocks::{
+    ActionRejection, Block, BlockId, Cause, CauseKind, Control, ControlCommand, EventKind,
+    SensorFrame, Truth,
+};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
     Clock, Graph, HealthBoard, PortError, Receiver, Sender, Source, SourceOutcome, Stamp, Topic,
@@ -10,6 +13,7 @@ use vigil_robot::injection::{Change, WireChange};
 
 use super::actions::Actions;
 use super::peers::Peers;
+use crate::action_gate::EffectiveCommand;
 use crate::injection_schedule::InjectionSchedule;
 use crate::navigation::{DecisionId, NavigatorEvent};
 use crate::simulation::Simulation;
@@ -18,7 +22,8 @@ use crate::simulation::Simulation;
 /// A specification has a handful.
 const CHANGES_MAX: usize = 16;
 
-/// Publishes the simulated rover's frames and executes actions, injections and control commands.
+/// Publishes the simulated rover's frames and what is true of it, and executes actions, injections
+/// and control commands.
 pub struct SimulatorSource {
     simulation: Simulation,
     event: Option<NavigatorEvent>,
@@ -28,6 +33,8 @@ pub struct SimulatorSource {
     actions: Actions,
     control: Box<dyn Receiver<Control>>,
     frames: Box<dyn Sender<SensorFrame>>,
+    truths: Box<dyn Sender<Truth>>,
+    at_goal: bool,
     last_ns: Option<u64>,
     began_ns: Option<u64>,
     period_ns: u64,
@@ -63,6 +70,8 @@ impl SimulatorSource {
             actions: Actions::new(graph)?,
             control: graph.receiver(Topic::Control(ServiceName::SensorSim))?,
             frames,
+            truths: graph.sender(Topic::Truth)?,
+            at_goal: false,
             last_ns: None,
             period_ns,
             began_ns: None,
@@ -91,6 +100,28 @@ impl SimulatorSource {
             self.changes.push((at_ns, change));
         }
         done
+    }
+
+    /// Fills the block of truth about this frame.
+    fn tell_truth(&mut self, frame: BlockId, run_id: u64, command: EffectiveCommand) {
+        let state = self.simulation.world.true_state();
+        let truth = self.truths.block();
+        truth.cause = Cause {
+            kind: CauseKind::Frame as u32,
+            count: 1,
+            frame_epoch: frame.epoch,
+            frame_seq: frame.seq,
+        };
+        truth.run_id = run_id;
+        (truth.pose, truth.velocity) = (state.pose, state.velocity);
+        if let (None, Some(action)) = (command.rejection, self.actions.newest()) {
+            truth.obeyed = action.kind;
+            (truth.stuck_wheels, truth.broken_encoders) =
+                (action.stuck_wheels, action.broken_encoders);
+        }
+        truth.is_disturbed = u32::from(self.simulation.world.is_disturbed());
+        truth.touches = u32::from(self.simulation.touches());
+        truth.at_goal = u32::from(self.at_goal);
     }
 
     fn take_due_injections(&mut self, t_schedule_ns: u64) {
@@ -157,16 +188,27 @@ impl Source for SimulatorSource {
             };
         }
         self.simulation.measure(self.frames.block());
+        let run_id = self.frames.block().run_id;
+        let frame = BlockId {
+            epoch: self.frames.epoch(),
+            seq: self.frames.next_seq(),
+        };
         self.event = self.simulation.take_event().or(self.event);
+        self.at_goal |= self.event == Some(NavigatorEvent::Goal);
         let stamp = Stamp {
             t_schedule_ns,
             t_capture_ns: t_schedule_ns,
         };
-        self.frames.send(stamp, clock).map(SourceOutcome::Frame)
+        let published_ns = self.frames.send(stamp, clock)?;
+        // Nobody in the graph waits for it: after the frame.
+        self.tell_truth(frame, run_id, command);
+        self.truths.send(stamp, clock)?;
+        Ok(SourceOutcome::Frame(published_ns))
     }
 
     fn prepare(&mut self) -> Result<(), PortError> {
-        self.frames.prepare()
+        self.frames.prepare()?;
+        self.truths.prepare()
     }
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {

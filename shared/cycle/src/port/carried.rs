@@ -1,7 +1,7 @@
 //! Blocks that topics carry.
 
 use vigil_blocks::{
-    Action, Block, Control, DetectionBelief, FaultBelief, Health, ParticleBlock, SensorFrame,
+    Action, Block, Control, DetectionBelief, FaultBelief, Health, ParticleBlock, SensorFrame, Truth,
 };
 
 use super::{Link, Receiver, Sender};
@@ -54,4 +54,5 @@ carried!(
     Health,
     ParticleBlock,
     SensorFrame,
+    Truth,
 );

@@ -7,7 +7,7 @@ use vigil_blocks::layout::{Field, Layout};
 use vigil_blocks::{
     Action, ActionOutcome, Block, Cause, CauseKind, ControlMode, DetectionBelief, Event,
     FaultBelief, FaultSet, Header, Health, HealthyBelief, ParticleBlock, RecoveryKind, SensorFrame,
-    SizeKind, Symptoms, Verdict, WeightedHypothesis,
+    SizeKind, Symptoms, Truth, Verdict, WeightedHypothesis,
 };
 
 pub use c::header;
@@ -52,6 +52,7 @@ fn structs() -> Vec<Struct> {
         block::<ParticleBlock>(),
         block::<FaultBelief>(),
         block::<Action>(),
+        block::<Truth>(),
         block::<Health>(),
         block::<Verdict>(),
     ]
