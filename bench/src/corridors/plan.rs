@@ -97,9 +97,11 @@ impl CorridorPlan {
 
     /// How far a pose is from the end of the way, m.
     #[must_use]
-    pub fn off_goal_m(&self, [x, y, _]: [f64; 3]) -> f64 {
+    pub fn off_goal_m(&self, pose: [f64; 3]) -> f64 {
         let goal = self.navigation.path.last();
-        goal.map_or(f64::INFINITY, |goal| (goal[0] - x).hypot(goal[1] - y))
+        goal.map_or(f64::INFINITY, |goal| {
+            (goal[0] - pose[0]).hypot(goal[1] - pose[1])
+        })
     }
 
     /// What it is about.
