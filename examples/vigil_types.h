@@ -199,6 +199,82 @@ VIGIL_ASSERT(offsetof(vigil_event, what) == 12);
 VIGIL_ASSERT(offsetof(vigil_event, p) == 16);
 VIGIL_ASSERT(offsetof(vigil_event, value) == 24);
 
+typedef struct {
+  /* Counts the graph's faults, from 1; 0: this place is free. */
+  uint64_t number;
+  /* When it was present first, ns. */
+  uint64_t first_ns;
+  /* When it was present last, ns. */
+  uint64_t last_ns;
+  /* When its state changed last, ns. */
+  uint64_t changed_ns;
+  /* Probability when it was present last. */
+  double p;
+  /* Expected size then, in the unit of size_kind; 0 without one. */
+  double size;
+  /* Its standard deviation. */
+  double size_sd;
+  /* Evidence of evidence_channel then, nat. */
+  double evidence;
+  /* Freeze frame: capture time of the frame nearest to the onset, ns; 0 without one. */
+  uint64_t frame_t_capture_ns;
+  /* See SensorFrame::channel_valid, of the freeze frame. */
+  uint64_t channel_valid;
+  /* Its channels. */
+  double channel[48];
+  /* Its command. */
+  double command[8];
+  /* Where it lies: a FaultSource. */
+  uint32_t source;
+  /* Of the robot: a node of the fault tree or MODE_UNKNOWN. Of an input: a Blindness. Of a service: its index in the order of the data. */
+  uint32_t what;
+  /* A FaultState. */
+  uint32_t state;
+  /* A Severity. */
+  uint32_t severity;
+  /* How often it became active. */
+  uint32_t count;
+  /* A SizeKind. */
+  uint32_t size_kind;
+  /* The channel that spoke most for it; see Evidence. */
+  uint32_t evidence_channel;
+  /* The next best explanation: a mode, as in FaultBelief::runner_up. */
+  uint32_t runner_up;
+  /* What was done about it last: an action of the decision model. */
+  uint32_t action;
+  /* See SensorFrame::command_valid, of the freeze frame. */
+  uint32_t command_valid;
+  /* 1 if it stays until somebody acknowledges it. */
+  uint32_t latches;
+  /* Reserved, zero. */
+  uint32_t reserved;
+} vigil_fault_record;
+VIGIL_ASSERT(sizeof(vigil_fault_record) == 576);
+VIGIL_ASSERT(offsetof(vigil_fault_record, number) == 0);
+VIGIL_ASSERT(offsetof(vigil_fault_record, first_ns) == 8);
+VIGIL_ASSERT(offsetof(vigil_fault_record, last_ns) == 16);
+VIGIL_ASSERT(offsetof(vigil_fault_record, changed_ns) == 24);
+VIGIL_ASSERT(offsetof(vigil_fault_record, p) == 32);
+VIGIL_ASSERT(offsetof(vigil_fault_record, size) == 40);
+VIGIL_ASSERT(offsetof(vigil_fault_record, size_sd) == 48);
+VIGIL_ASSERT(offsetof(vigil_fault_record, evidence) == 56);
+VIGIL_ASSERT(offsetof(vigil_fault_record, frame_t_capture_ns) == 64);
+VIGIL_ASSERT(offsetof(vigil_fault_record, channel_valid) == 72);
+VIGIL_ASSERT(offsetof(vigil_fault_record, channel) == 80);
+VIGIL_ASSERT(offsetof(vigil_fault_record, command) == 464);
+VIGIL_ASSERT(offsetof(vigil_fault_record, source) == 528);
+VIGIL_ASSERT(offsetof(vigil_fault_record, what) == 532);
+VIGIL_ASSERT(offsetof(vigil_fault_record, state) == 536);
+VIGIL_ASSERT(offsetof(vigil_fault_record, severity) == 540);
+VIGIL_ASSERT(offsetof(vigil_fault_record, count) == 544);
+VIGIL_ASSERT(offsetof(vigil_fault_record, size_kind) == 548);
+VIGIL_ASSERT(offsetof(vigil_fault_record, evidence_channel) == 552);
+VIGIL_ASSERT(offsetof(vigil_fault_record, runner_up) == 556);
+VIGIL_ASSERT(offsetof(vigil_fault_record, action) == 560);
+VIGIL_ASSERT(offsetof(vigil_fault_record, command_valid) == 564);
+VIGIL_ASSERT(offsetof(vigil_fault_record, latches) == 568);
+VIGIL_ASSERT(offsetof(vigil_fault_record, reserved) == 572);
+
 #define VIGIL_SENSOR_FRAME_SCHEMA 0xe54ee7c97147decdull
 #define VIGIL_SENSOR_FRAME_TYPE_NAME "vigil.SensorFrame.v1.e54ee7c97147decd"
 typedef struct {
@@ -591,6 +667,39 @@ VIGIL_ASSERT(offsetof(vigil_truth, is_disturbed) == 136);
 VIGIL_ASSERT(offsetof(vigil_truth, touches) == 140);
 VIGIL_ASSERT(offsetof(vigil_truth, at_goal) == 144);
 VIGIL_ASSERT(offsetof(vigil_truth, reserved) == 148);
+
+#define VIGIL_FAULTS_SCHEMA 0x24aab250bf39a5f7ull
+#define VIGIL_FAULTS_TYPE_NAME "vigil.Faults.v1.24aab250bf39a5f7"
+typedef struct {
+  /* Common header. */
+  vigil_header header;
+  /* Hash of the fault tree that gives the nodes their names. */
+  uint64_t tree_hash;
+  /* Rises with each change of a fault or of the overall state. */
+  uint64_t revision;
+  /* Faults so far, kept or not. */
+  uint64_t fault_count;
+  /* Faults that nobody sees, as no place was free. */
+  uint32_t dropped_count;
+  /* The overall state: an OverallState. */
+  uint32_t overall;
+  /* The last orders of operators that were carried out: epoch of their writer. */
+  uint64_t order_epoch;
+  /* Their sequence number. */
+  uint64_t order_seq;
+  /* The faults, in no order. */
+  vigil_fault_record records[16];
+} vigil_faults;
+VIGIL_ASSERT(sizeof(vigil_faults) == 9312);
+VIGIL_ASSERT(offsetof(vigil_faults, header) == 0);
+VIGIL_ASSERT(offsetof(vigil_faults, tree_hash) == 48);
+VIGIL_ASSERT(offsetof(vigil_faults, revision) == 56);
+VIGIL_ASSERT(offsetof(vigil_faults, fault_count) == 64);
+VIGIL_ASSERT(offsetof(vigil_faults, dropped_count) == 72);
+VIGIL_ASSERT(offsetof(vigil_faults, overall) == 76);
+VIGIL_ASSERT(offsetof(vigil_faults, order_epoch) == 80);
+VIGIL_ASSERT(offsetof(vigil_faults, order_seq) == 88);
+VIGIL_ASSERT(offsetof(vigil_faults, records) == 96);
 
 #define VIGIL_HEALTH_SCHEMA 0x22ca8e52d533df67ull
 #define VIGIL_HEALTH_TYPE_NAME "vigil.Health.v1.22ca8e52d533df67"

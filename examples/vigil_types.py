@@ -212,6 +212,86 @@ assert Event.p.offset == 16
 assert Event.value.offset == 24
 
 
+class FaultRecord(ctypes.LittleEndianStructure):
+    _fields_ = [
+        # Counts the graph's faults, from 1; 0: this place is free.
+        ("number", ctypes.c_uint64),
+        # When it was present first, ns.
+        ("first_ns", ctypes.c_uint64),
+        # When it was present last, ns.
+        ("last_ns", ctypes.c_uint64),
+        # When its state changed last, ns.
+        ("changed_ns", ctypes.c_uint64),
+        # Probability when it was present last.
+        ("p", ctypes.c_double),
+        # Expected size then, in the unit of size_kind; 0 without one.
+        ("size", ctypes.c_double),
+        # Its standard deviation.
+        ("size_sd", ctypes.c_double),
+        # Evidence of evidence_channel then, nat.
+        ("evidence", ctypes.c_double),
+        # Freeze frame: capture time of the frame nearest to the onset, ns; 0 without one.
+        ("frame_t_capture_ns", ctypes.c_uint64),
+        # See SensorFrame::channel_valid, of the freeze frame.
+        ("channel_valid", ctypes.c_uint64),
+        # Its channels.
+        ("channel", ctypes.c_double * 48),
+        # Its command.
+        ("command", ctypes.c_double * 8),
+        # Where it lies: a FaultSource.
+        ("source", ctypes.c_uint32),
+        # Of the robot: a node of the fault tree or MODE_UNKNOWN. Of an input: a Blindness. Of a service: its index in the order of the data.
+        ("what", ctypes.c_uint32),
+        # A FaultState.
+        ("state", ctypes.c_uint32),
+        # A Severity.
+        ("severity", ctypes.c_uint32),
+        # How often it became active.
+        ("count", ctypes.c_uint32),
+        # A SizeKind.
+        ("size_kind", ctypes.c_uint32),
+        # The channel that spoke most for it; see Evidence.
+        ("evidence_channel", ctypes.c_uint32),
+        # The next best explanation: a mode, as in FaultBelief::runner_up.
+        ("runner_up", ctypes.c_uint32),
+        # What was done about it last: an action of the decision model.
+        ("action", ctypes.c_uint32),
+        # See SensorFrame::command_valid, of the freeze frame.
+        ("command_valid", ctypes.c_uint32),
+        # 1 if it stays until somebody acknowledges it.
+        ("latches", ctypes.c_uint32),
+        # Reserved, zero.
+        ("reserved", ctypes.c_uint32),
+    ]
+
+
+assert ctypes.sizeof(FaultRecord) == 576
+assert FaultRecord.number.offset == 0
+assert FaultRecord.first_ns.offset == 8
+assert FaultRecord.last_ns.offset == 16
+assert FaultRecord.changed_ns.offset == 24
+assert FaultRecord.p.offset == 32
+assert FaultRecord.size.offset == 40
+assert FaultRecord.size_sd.offset == 48
+assert FaultRecord.evidence.offset == 56
+assert FaultRecord.frame_t_capture_ns.offset == 64
+assert FaultRecord.channel_valid.offset == 72
+assert FaultRecord.channel.offset == 80
+assert FaultRecord.command.offset == 464
+assert FaultRecord.source.offset == 528
+assert FaultRecord.what.offset == 532
+assert FaultRecord.state.offset == 536
+assert FaultRecord.severity.offset == 540
+assert FaultRecord.count.offset == 544
+assert FaultRecord.size_kind.offset == 548
+assert FaultRecord.evidence_channel.offset == 552
+assert FaultRecord.runner_up.offset == 556
+assert FaultRecord.action.offset == 560
+assert FaultRecord.command_valid.offset == 564
+assert FaultRecord.latches.offset == 568
+assert FaultRecord.reserved.offset == 572
+
+
 class SensorFrame(ctypes.LittleEndianStructure):
     SCHEMA = 0xE54EE7C97147DECD
     TYPE_NAME = "vigil.SensorFrame.v1.e54ee7c97147decd"
@@ -657,6 +737,48 @@ assert Truth.is_disturbed.offset == 136
 assert Truth.touches.offset == 140
 assert Truth.at_goal.offset == 144
 assert Truth.reserved.offset == 148
+
+
+class Faults(ctypes.LittleEndianStructure):
+    SCHEMA = 0x24AAB250BF39A5F7
+    TYPE_NAME = "vigil.Faults.v1.24aab250bf39a5f7"
+
+    @staticmethod
+    def type_name():
+        return Faults.TYPE_NAME
+
+    _fields_ = [
+        # Common header.
+        ("header", Header),
+        # Hash of the fault tree that gives the nodes their names.
+        ("tree_hash", ctypes.c_uint64),
+        # Rises with each change of a fault or of the overall state.
+        ("revision", ctypes.c_uint64),
+        # Faults so far, kept or not.
+        ("fault_count", ctypes.c_uint64),
+        # Faults that nobody sees, as no place was free.
+        ("dropped_count", ctypes.c_uint32),
+        # The overall state: an OverallState.
+        ("overall", ctypes.c_uint32),
+        # The last orders of operators that were carried out: epoch of their writer.
+        ("order_epoch", ctypes.c_uint64),
+        # Their sequence number.
+        ("order_seq", ctypes.c_uint64),
+        # The faults, in no order.
+        ("records", FaultRecord * 16),
+    ]
+
+
+assert ctypes.sizeof(Faults) == 9312
+assert Faults.header.offset == 0
+assert Faults.tree_hash.offset == 48
+assert Faults.revision.offset == 56
+assert Faults.fault_count.offset == 64
+assert Faults.dropped_count.offset == 72
+assert Faults.overall.offset == 76
+assert Faults.order_epoch.offset == 80
+assert Faults.order_seq.offset == 88
+assert Faults.records.offset == 96
 
 
 class Health(ctypes.LittleEndianStructure):

@@ -52,7 +52,7 @@ fn a_restarted_simulator_goes_on_with_its_broken_rover() {
     assert_eq!(injected, ["encoder:LF:zero", "encoder:LF:zero"]);
 }
 
-fn kill(pid: u32) {
+pub fn kill(pid: u32) {
     let status = Command::new("kill")
         .args(["-9", &pid.to_string()])
         .status()

@@ -9,6 +9,7 @@ mod bad_input;
 mod built;
 mod corridor;
 mod external;
+mod faults;
 mod harness;
 mod identity;
 mod injection;

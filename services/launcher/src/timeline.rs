@@ -5,16 +5,17 @@ use std::fmt;
 
 use serde::Serialize;
 use vigil_blocks::{
-    ActionRejection, AnsweredWheels, Blindness, Event, EventKind, Evidence, MODE_MULTIPLE,
-    Rejection, SizeKind, Weighing, mode_word,
+    ActionRejection, AnsweredWheels, Blindness, Event, EventKind, FaultState, MODE_MULTIPLE,
+    Rejection, SizeKind, Weighing,
 };
 use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::watchdog::WatchdogFinding;
-use vigil_robot::channel::{Role, channels};
+use vigil_robot::FaultTree;
+use vigil_robot::channel::evidence_name;
 use vigil_robot::injection::{Change, WireChange};
 use vigil_robot::publisher_check::Finding;
-use vigil_setup::Setup;
+use vigil_setup::{Setup, fault_name};
 
 use crate::weighing::NamedWeighing;
 use crate::words;
@@ -42,6 +43,26 @@ pub struct TimelineEntry {
     /// Of a step of the decision model.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<NamedStep>,
+    /// Of a change in the life of a fault.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fault: Option<NamedFault>,
+}
+
+/// A fault that has another state, with its names.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct NamedFault {
+    /// Counts the graph's faults, from 1.
+    pub number: u64,
+    /// Its name.
+    pub name: String,
+    /// Its state.
+    pub state: &'static str,
+}
+
+impl fmt::Display for NamedFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} is {}", self.name, self.state)
+    }
 }
 
 /// A step of the decision model, with its names.
@@ -296,7 +317,7 @@ fn text_of(carried: Option<impl fmt::Display>) -> String {
 
 /// Gives names to what events are about.
 struct Namer {
-    nodes: Vec<String>,
+    tree: FaultTree,
     states: Vec<String>,
     actions: Vec<String>,
     observations: Vec<String>,
@@ -308,10 +329,9 @@ struct Namer {
 impl Namer {
     /// Names from a graph's models.
     fn new(setup: &Setup) -> Self {
-        let nodes = setup.tree.nodes().iter();
         let symptoms = setup.file.supervisor.symptoms.iter();
         Self {
-            nodes: nodes.map(|node| node.name.clone()).collect(),
+            tree: setup.tree.clone(),
             states: setup.decision.states().to_vec(),
             actions: setup.decision.actions().to_vec(),
             observations: setup.decision.observations().to_vec(),
@@ -343,6 +363,7 @@ impl Namer {
                 .then(|| self.set(event.value)),
             weighing: self.weighing(event),
             step: self.step(event),
+            fault: self.fault(event),
         }
     }
 
@@ -363,42 +384,25 @@ impl Namer {
 
     /// Leaves, given as bits, joined by `+`.
     fn set(&self, leaves: u64) -> String {
-        let nodes = self.nodes.iter().enumerate();
+        let nodes = self.tree.nodes().iter().enumerate();
         let names = nodes.filter(|(i, _)| leaves >> i & 1 == 1);
-        let names: Vec<&str> = names.map(|(_, name)| name.as_str()).collect();
+        let names: Vec<&str> = names.map(|(_, node)| node.name.as_str()).collect();
         names.join("+")
-    }
-
-    fn channel(&self, channel: usize) -> String {
-        match channel {
-            Evidence::POSE => return "pose".into(),
-            Evidence::ANY => return "all channels".into(),
-            _ => {}
-        }
-        let channels = channels(&self.robot);
-        let Some(channel) = channels.get(channel) else {
-            return "?".into();
-        };
-        let wheel = channel.wheel.and_then(|i| self.robot.wheels.get(i));
-        match (channel.role, wheel) {
-            (Role::WheelRate, Some(wheel)) => format!("wheel rate {}", wheel.name),
-            (Role::SteeringAngle, Some(wheel)) => format!("steering {}", wheel.name),
-            _ => channel.name.clone(),
-        }
     }
 
     fn what(&self, kind: EventKind, event: &Event) -> String {
         match kind {
             EventKind::Diagnosis | EventKind::Cleared => self.mode(event.what),
             EventKind::Reason => {
-                let (channel, evidence) = (self.channel(event.what as usize), event.p);
+                let (channel, evidence) =
+                    (evidence_name(&self.robot, event.what as usize), event.p);
                 let runner_up = self.mode(event.value as u32);
                 format!("{channel} says so by {evidence:.1} nat, against {runner_up}")
             }
             EventKind::Size => {
                 let kind = SizeKind::from_wire(event.what >> 8);
                 let node = self.mode(event.what & 0xff);
-                format!("{node} {}", words::size(kind, event.p, event.value))
+                format!("{node} {}", kind.text(event.p, f64::from_bits(event.value)))
             }
             EventKind::Action | EventKind::Obeys => {
                 let action = self.actions.get(event.what as usize);
@@ -446,6 +450,7 @@ impl Namer {
             }
             EventKind::Weighed => text_of(self.weighing(event)),
             EventKind::Step => text_of(self.step(event)),
+            EventKind::Fault => text_of(self.fault(event)),
             EventKind::Particles => format!("{} of {}", event.what, event.value),
             EventKind::Watchdog => {
                 let found = WatchdogFinding::from_repr(event.what);
@@ -456,8 +461,17 @@ impl Namer {
     }
 
     fn mode(&self, node: u32) -> String {
-        let name = self.nodes.get(node as usize).map(String::as_str);
-        mode_word(node).or(name).unwrap_or("?").to_owned()
+        self.tree.mode_name(node).to_owned()
+    }
+
+    fn fault(&self, event: &Event) -> Option<NamedFault> {
+        let (source, what) = (event.what >> 16, event.what & 0xffff);
+        let state = FaultState::from_repr(event.value as u32 & 0xff);
+        (event.kind == EventKind::Fault as u32).then(|| NamedFault {
+            number: event.value >> 8,
+            name: fault_name(&self.tree, source, what).to_owned(),
+            state: state.map_or("?", FaultState::name),
+        })
     }
 }
 

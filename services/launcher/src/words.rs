@@ -1,6 +1,6 @@
-//! Words of the timeline: symptoms, sizes, outcomes, degraded services, blindness, watchdog.
+//! Words of the timeline: symptoms, outcomes, degraded services, blindness, watchdog.
 
-use vigil_blocks::{ActionOutcome, Blindness, Degraded, Event, RecoveryKind, SizeKind, Symptoms};
+use vigil_blocks::{ActionOutcome, Blindness, Degraded, Event, RecoveryKind, Symptoms};
 use vigil_cycle::watchdog::WatchdogFinding;
 
 /// Symptoms, joined by `_` as in the decision model; `none` for the empty set. `own` are those that
@@ -14,17 +14,6 @@ pub fn symptoms(set: u32, own: &[(String, u32)]) -> String {
         "none".into()
     } else {
         present.join("_")
-    }
-}
-
-/// In which way a component is broken, and by how much: `gain 0.50 (sd 0.02)`. The standard
-/// deviation as an event carries it.
-pub fn size(kind: SizeKind, size: f64, sd_bits: u64) -> String {
-    let (way, sd) = (kind.word(), f64::from_bits(sd_bits));
-    match kind.unit() {
-        None => way.to_owned(),
-        Some("") => format!("{way} {size:.2} (sd {sd:.2})"),
-        Some(unit) => format!("{way} {size:.2} {unit} (sd {sd:.2})"),
     }
 }
 
@@ -95,17 +84,6 @@ mod tests {
         assert_eq!(degraded(0), "no longer");
         let both = Degraded::INPUT_LOST | Degraded::LATE;
         assert_eq!(degraded(both), "input lost, late");
-    }
-
-    #[test]
-    fn a_size_has_its_unit_and_ways_without_size_have_none() {
-        let sd = 0.02_f64.to_bits();
-        assert_eq!(size(SizeKind::Gain, 0.5, sd), "gain 0.50 (sd 0.02)");
-        assert_eq!(
-            size(SizeKind::AngleRad, 0.2, sd),
-            "angle 0.20 rad (sd 0.02)"
-        );
-        assert_eq!(size(SizeKind::Zero, 0.0, sd), "zero");
     }
 
     #[test]

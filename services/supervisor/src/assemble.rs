@@ -2,7 +2,7 @@
 
 use vigil_setup::Setup;
 
-use vigil_decision::{Compensation, Supervisor, SupervisorError};
+use vigil_decision::{Compensation, FaultLife, FaultRuleError, Supervisor, SupervisorError};
 
 /// Without any belief the robot stops after this long, ns. Chosen by hand: two observations, in
 /// which a robot of 0.2 m/s drives 2 cm.
@@ -38,6 +38,14 @@ pub fn assemble(setup: &Setup) -> Result<Supervisor, SupervisorError> {
         compensation,
         (BLIND_NS / setup.period_ns()).max(BLIND_MISSES_MIN) as u32,
     )
+}
+
+/// The life of faults that a configuration describes.
+///
+/// # Errors
+/// [`FaultRuleError`] for a rule about what does not exist.
+pub fn fault_life(setup: &Setup) -> Result<FaultLife, FaultRuleError> {
+    FaultLife::new(&setup.file.faults, &setup.tree)
 }
 
 /// How long an action stays valid, ns: long enough to survive a few lost cycles, short enough to

@@ -1,15 +1,17 @@
 //! `vigil-supervisor`: the supervisor as a process of the graph. Exit codes: 0 stopped, 1 failed,
 //! 2 configuration, 3 a missed deadline under `on_miss = "stop"`, 70 a failed assertion.
 
+use std::error::Error;
 use std::process::ExitCode;
 
 use clap::Parser;
 use vigil_blocks::FaultBelief;
-use vigil_cycle::Topic;
-use vigil_cycle::serve;
+use vigil_cycle::serve::{self, ServeError};
 use vigil_cycle::topic::ServiceName;
-use vigil_setup::ServiceArgs;
-use vigil_supervisor::{SupervisorStage, assemble, validity_ns};
+use vigil_cycle::{KeptBlock, Topic};
+use vigil_decision::{FaultLife, Supervisor};
+use vigil_setup::{ServiceArgs, Setup};
+use vigil_supervisor::{FaultBoard, SupervisorStage, assemble, fault_life, validity_ns};
 
 /// Decides what to do about a fault.
 #[derive(Debug, Parser)]
@@ -24,16 +26,21 @@ fn main() -> ExitCode {
     serve::process(
         ServiceName::Supervisor,
         args.check,
-        || args.prepare(assemble),
-        |(setup, supervisor)| {
+        || args.prepare(parts),
+        |(setup, (supervisor, life))| {
             let plan = setup.plan(ServiceName::Supervisor, args.leave());
             serve::stage::<FaultBelief, _>(&plan, Topic::Diagnosis, |graph| {
-                Ok(SupervisorStage::new(
-                    supervisor,
-                    graph,
-                    validity_ns(&setup),
-                )?)
+                let kept = KeptBlock::open(&setup.domain()?.faults_file());
+                let kept = kept.map_err(|e| ServeError::Build(format!("kept faults: {e}")))?;
+                let board = FaultBoard::new(life, setup.tree.hash(), graph, Some(kept))?;
+                let valid_ns = validity_ns(&setup);
+                Ok(SupervisorStage::new(supervisor, board, graph, valid_ns)?)
             })
         },
     )
+}
+
+/// What decides, and what keeps the faults.
+fn parts(setup: &Setup) -> Result<(Supervisor, FaultLife), Box<dyn Error>> {
+    Ok((assemble(setup)?, fault_life(setup)?))
 }

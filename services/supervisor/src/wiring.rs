@@ -11,6 +11,8 @@ use vigil_cycle::{
 
 use vigil_decision::{Inputs, Supervisor};
 
+use crate::fault_board::FaultBoard;
+
 /// The supervisor as a stage of the graph: diagnoses and detections in, actions out.
 pub struct SupervisorStage {
     supervisor: Supervisor,
@@ -30,6 +32,7 @@ pub struct SupervisorStage {
     alarm: AlarmCount,
     /// What the timeline has of `alarm`.
     alarm_reported: AlarmCount,
+    board: FaultBoard,
     latched_reported: Option<usize>,
 }
 
@@ -60,12 +63,17 @@ struct LastDecision {
 }
 
 impl SupervisorStage {
-    /// Opens the supervisor's ports on `graph`. Each action is valid for `validity_ns` after its
-    /// publication.
+    /// Opens the supervisor's ports on `graph`, beside those of the faults. Each action is valid
+    /// for `validity_ns` after its publication.
     ///
     /// # Errors
     /// The transport's.
-    pub fn new(supervisor: Supervisor, graph: &Graph, validity_ns: u64) -> Result<Self, PortError> {
+    pub fn new(
+        supervisor: Supervisor,
+        board: FaultBoard,
+        graph: &Graph,
+        validity_ns: u64,
+    ) -> Result<Self, PortError> {
         Ok(Self {
             supervisor,
             diagnoses: graph.receiver(Topic::Diagnosis)?,
@@ -81,6 +89,7 @@ impl SupervisorStage {
             decision_reported: 0,
             alarm: AlarmCount::default(),
             alarm_reported: AlarmCount::default(),
+            board,
             latched_reported: None,
         })
     }
@@ -160,6 +169,7 @@ impl Stage for SupervisorStage {
                 };
                 self.supervisor
                     .step(Entry::Frame(inputs), self.action.block());
+                self.board.take(diagnosis);
                 self.detection_is_new = false;
                 intake.stepped(header, cause.frame());
             }
@@ -208,7 +218,11 @@ impl Stage for SupervisorStage {
                 false => Weighing::new(action),
             },
         };
-        self.action.send(stamp, clock)
+        self.board.decide(action);
+        let published_ns = self.action.send(stamp, clock)?;
+        // Operators wait for it, not the robot: after the action.
+        self.board.turn(clock)?;
+        Ok(published_ns)
     }
 
     fn prepare(&mut self) -> Result<(), PortError> {
@@ -222,6 +236,7 @@ impl Stage for SupervisorStage {
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         health.add_input(&self.detection_account);
         self.report(health, now_ns);
+        self.board.report(health, now_ns);
         let LastDecision {
             seq,
             action,

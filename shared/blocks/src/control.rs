@@ -4,13 +4,14 @@ use crate::block::block;
 use crate::header::Header;
 
 block! {
-    /// Written by the operator's tool; refused unless the configuration permits it.
+    /// Written by the operator's tool. Faults are injected only if the configuration permits it.
     pub struct Control, size 96 {
         /// Common header.
         pub header: Header,
         /// A [`ControlCommand`].
         pub command: u32,
-        /// Fault or disturbance to inject or clear: its kind code; 0 to clear all kinds.
+        /// Fault or disturbance to inject or clear: its kind code; 0 to clear all kinds. To
+        /// acknowledge: the number of the fault, 0 for all.
         pub fault: u32,
         /// Wheel, by index in the robot's description, or side; `u32::MAX` for all.
         pub wheel: u32,
@@ -29,4 +30,8 @@ pub enum ControlCommand {
     Inject = 1,
     /// Remove a fault.
     Clear = 2,
+    /// Somebody knows of a fault: for the supervisor.
+    Acknowledge = 3,
+    /// Forget faults that are over: for the supervisor.
+    Forget = 4,
 }

@@ -124,6 +124,10 @@ pub enum EventKind {
     Step = 37,
     /// A service was started again. Only the launcher records it.
     Restarted = 38,
+    /// The state of a fault changed. `what`: its [`crate::FaultRecord::what`] + 65536 x its
+    /// [`crate::FaultSource`]; `p`: its probability; `value`: its [`crate::FaultState`] + 256 x its
+    /// number.
+    Fault = 39,
 }
 
 impl EventKind {

@@ -53,12 +53,17 @@ macro_rules! part {
     ) => {
         $(#[$meta])*
         #[repr(C)]
-        #[derive(Debug, Clone, Copy, PartialEq, Default, bytemuck::Pod, bytemuck::Zeroable)]
+        #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
         pub struct $name { $( $(#[$field_meta])* pub $field : $ty, )+ }
 
         $crate::layout!($name { $( $([$field_meta])* $field : $ty, )+ });
 
         const _: () = assert!(size_of::<$name>() == $size);
+
+        impl Default for $name {
+            /// All zero.
+            fn default() -> Self { bytemuck::Zeroable::zeroed() }
+        }
     };
 }
 pub(crate) use part;

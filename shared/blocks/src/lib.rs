@@ -7,6 +7,7 @@ mod control;
 pub mod datagram;
 mod detection;
 mod diagnosis;
+mod faults;
 mod header;
 mod health;
 mod journal;
@@ -33,6 +34,7 @@ pub use diagnosis::{
     FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
     mode_word,
 };
+pub use faults::{FAULTS, FaultRecord, FaultSource, FaultState, Faults, OverallState, Severity};
 pub use header::{BlockId, Cause, CauseKind, Header};
 pub use health::{Degraded, EVENTS, Event, EventKind, Health, ServiceState};
 pub use journal::Entry;

@@ -101,6 +101,17 @@ impl SizeKind {
         }
     }
 
+    /// In which way a component is broken, and by how much: `gain 0.50 (sd 0.02)`.
+    #[must_use]
+    pub fn text(self, size: f64, sd: f64) -> String {
+        let way = self.word();
+        match self.unit() {
+            None => way.to_owned(),
+            Some("") => format!("{way} {size:.2} (sd {sd:.2})"),
+            Some(unit) => format!("{way} {size:.2} {unit} (sd {sd:.2})"),
+        }
+    }
+
     /// Unit of the size, empty for a ratio; None if the way has no size.
     #[must_use]
     pub const fn unit(self) -> Option<&'static str> {
@@ -134,6 +145,14 @@ impl SizeKind {
 #[cfg(test)]
 mod tests {
     use super::SizeKind;
+
+    #[test]
+    fn a_size_has_its_unit_and_ways_without_size_have_none() {
+        assert_eq!(SizeKind::Gain.text(0.5, 0.02), "gain 0.50 (sd 0.02)");
+        let angle = SizeKind::AngleRad.text(0.2, 0.02);
+        assert_eq!(angle, "angle 0.20 rad (sd 0.02)");
+        assert_eq!(SizeKind::Zero.text(0.0, 0.02), "zero");
+    }
 
     #[test]
     fn codes_are_the_places_in_the_list() {

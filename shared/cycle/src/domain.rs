@@ -156,6 +156,12 @@ impl Domain {
         self.folder.join("processes")
     }
 
+    /// File in which the supervisor keeps the faults, for one that replaces it.
+    #[must_use]
+    pub fn faults_file(&self) -> PathBuf {
+        self.folder.join("faults")
+    }
+
     /// File in which a service whose assertion has failed leaves a [`crate::failure::Failure`].
     #[must_use]
     pub fn failure_file(&self, service: ServiceName) -> PathBuf {
@@ -303,6 +309,7 @@ impl Domain {
             self.channels_file(),
             self.addresses_file(),
             self.start_file(),
+            self.faults_file(),
         ] {
             let _ = fs::remove_file(file);
         }

@@ -13,6 +13,8 @@ pub enum Topic {
     Diagnosis,
     /// The identifier's particles.
     DiagnosisParticles,
+    /// The life of faults.
+    Faults,
     /// The supervisor's action.
     Action,
     /// What is true of a simulated robot.
@@ -78,6 +80,7 @@ impl Topic {
             Self::DetectionParticles => format!("vigil/{graph}/detection/particles"),
             Self::Diagnosis => format!("vigil/{graph}/diagnosis"),
             Self::DiagnosisParticles => format!("vigil/{graph}/diagnosis/particles"),
+            Self::Faults => format!("vigil/{graph}/faults"),
             Self::Action => format!("vigil/{graph}/action"),
             Self::Truth => format!("vigil/{graph}/truth"),
             Self::Health(service) => format!("vigil/{graph}/health/{}", service.as_str()),

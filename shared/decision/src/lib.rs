@@ -7,6 +7,7 @@ mod despot_settings;
 mod epoch;
 mod error;
 mod fault_decision;
+mod fault_life;
 mod hardware_belief;
 mod inputs;
 mod joint_states;
@@ -27,6 +28,10 @@ mod wheels;
 pub use alarm_fusion::fused_alarm;
 pub use despot_settings::DespotSettings;
 pub use error::SupervisorError;
+pub use fault_life::{
+    CycleDecision, FaultLife, FaultLifeSettings, FaultRule, FaultRuleError, LifeInput, LifeOrder,
+    RuleSeverity,
+};
 pub use inputs::Inputs;
 pub use mapping::Compensation;
 pub use settings::{Counts, Evidence, Gate, OwnSymptom, Recovery, RecoveryAction, Settings};

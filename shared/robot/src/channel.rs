@@ -5,7 +5,7 @@
 //! (`x`, `y`, `yaw`), wheel rates (`enc_<WHEEL>`), steering angles (`steer_<WHEEL>`), yaw rate
 //! (`yaw_rate`), currents (`current_<WHEEL>`), and the description's `[[channel]]` tables.
 
-use vigil_blocks::{CHANNELS, COMMANDS, WHEELS, fnv1a};
+use vigil_blocks::{CHANNELS, COMMANDS, Evidence, WHEELS, fnv1a};
 
 use crate::channel_table::FurtherChannel;
 pub use crate::channel_table::Role;
@@ -134,4 +134,24 @@ pub fn channel_list_text(robot: &Description) -> String {
         text += &format!("channel {place} {} {}\n", channel.name, unit(&channel.unit));
     }
     text
+}
+
+/// What a place of the evidence by channel is called: a channel, or several at once.
+#[must_use]
+pub fn evidence_name(robot: &Description, place: usize) -> String {
+    match place {
+        Evidence::POSE => return "pose".into(),
+        Evidence::ANY => return "all channels".into(),
+        _ => {}
+    }
+    let channels = channels(robot);
+    let Some(channel) = channels.get(place) else {
+        return "?".into();
+    };
+    let wheel = channel.wheel.and_then(|i| robot.wheels.get(i));
+    match (channel.role, wheel) {
+        (Role::WheelRate, Some(wheel)) => format!("wheel rate {}", wheel.name),
+        (Role::SteeringAngle, Some(wheel)) => format!("steering {}", wheel.name),
+        _ => channel.name.clone(),
+    }
 }

@@ -1,6 +1,6 @@
 //! The fault tree: nominal mode, abstract nodes, leaves.
 
-use vigil_blocks::{FAULT_NODES, fnv1a};
+use vigil_blocks::{FAULT_NODES, fnv1a, mode_word};
 
 /// One node of a [`FaultTree`].
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -87,6 +87,15 @@ impl FaultTree {
     #[must_use]
     pub const fn hash(&self) -> u64 {
         self.hash
+    }
+
+    /// The name of a mode of the diagnosis: a node's, or the word for one that is no node; `?` for
+    /// what this tree does not have.
+    #[must_use]
+    pub fn mode_name(&self, mode: u32) -> &str {
+        let node = self.nodes.get(mode as usize);
+        let name = node.map(|node| node.name.as_str());
+        mode_word(mode).or(name).unwrap_or("?")
     }
 
     /// Indices of the leaves, in order; all below [`FAULT_NODES`], so that a block holds each.

@@ -58,6 +58,9 @@ pub struct GraphFile {
     /// The decision system.
     #[serde(default)]
     pub supervisor: vigil_decision::Settings,
+    /// The life of faults.
+    #[serde(default)]
+    pub faults: vigil_decision::FaultLifeSettings,
     /// Control commands at run time.
     #[serde(default)]
     pub control: ControlSettings,

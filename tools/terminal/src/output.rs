@@ -12,6 +12,14 @@ pub fn json(document: &impl Serialize) -> io::Result<()> {
     line(&serde_json::to_string_pretty(document)?)
 }
 
+/// Prints one JSON document as a line.
+///
+/// # Errors
+/// The system's, except that of a closed pipe.
+pub fn json_line(document: &impl Serialize) -> io::Result<()> {
+    line(&serde_json::to_string(document)?)
+}
+
 /// Prints a line.
 ///
 /// # Errors

@@ -5,7 +5,8 @@ use std::fs;
 
 use serde::Serialize;
 use vigil_blocks::{
-    Action, Control, DetectionBelief, FaultBelief, Health, ParticleBlock, SensorFrame, Truth,
+    Action, Control, DetectionBelief, FaultBelief, Faults, Health, ParticleBlock, SensorFrame,
+    Truth,
 };
 use vigil_cycle::Topic;
 use vigil_cycle::domain::shared_memory_free_bytes;
@@ -211,7 +212,7 @@ fn shared_memory(setup: &Setup) -> Finding {
         size_of::<DetectionBelief>(),
         2 * size_of::<ParticleBlock>(),
         size_of::<FaultBelief>(),
-        size_of::<Action>(),
+        size_of::<Action>() + size_of::<Faults>(),
         ServiceName::ALL.len() * (size_of::<Health>() + size_of::<Control>()),
     ];
     let others = sizes.iter().map(|&size| queues.reserved_bytes(size));

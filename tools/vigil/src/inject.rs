@@ -1,19 +1,16 @@
 //! `vigil inject`: breaks the simulated rover at run time, where the configuration permits it.
 
-use std::time::{Duration, Instant};
-
-use vigil_blocks::{Control, ControlCommand, Health};
+use vigil_blocks::{Control, ControlCommand};
 use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
-use vigil_cycle::{Graph, Monotonic, Receiver, Stamp, Topic};
+use vigil_cycle::{Graph, Topic};
 use vigil_robot::Injection;
 use vigil_robot::disturbance_kind::PARAMETERS;
 use vigil_setup::GraphArgs;
 
 use vigil_terminal::{CommandError, Outcome};
 
-/// Time that the simulator may take to answer.
-const ANSWER_LIMIT: Duration = Duration::from_secs(2);
+use crate::command::send;
 
 /// Breaks the simulated rover of a running graph, or mends it.
 #[derive(Debug, clap::Args)]
@@ -48,9 +45,6 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let link = Link::join(&domain, "vigil-inject").map_err(CommandError::failure)?;
     let graph = Graph::SharedMemory(link);
     let simulator = ServiceName::SensorSim;
-    let mut health = graph
-        .receiver(Topic::Health(simulator))
-        .map_err(CommandError::failure)?;
     let mut sender = graph
         .sender::<Control>(Topic::Control(simulator))
         .map_err(CommandError::failure)?;
@@ -62,11 +56,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     };
     (block.command, block.fault, block.wheel) = (command as u32, wire.kind, wire.place);
     block.parameter[..PARAMETERS].copy_from_slice(&wire.parameter);
-    let (epoch, seq) = (sender.epoch(), sender.next_seq());
-    sender
-        .send(Stamp::default(), &Monotonic)
-        .map_err(CommandError::failure)?;
-    match answer(health.as_mut(), epoch, seq) {
+    match send(&graph, simulator, sender.as_mut())? {
         Some(true) => {
             eprintln!("injected {}", args.spec);
             Ok(Outcome::Done)
@@ -74,18 +64,4 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         Some(false) => Err(CommandError::failure("the simulator refused the injection")),
         None => Err(CommandError::failure("no simulator answered")),
     }
-}
-
-/// Waits for the answer to command (epoch, seq).
-fn answer(health: &mut dyn Receiver<Health>, epoch: u64, seq: u64) -> Option<bool> {
-    let started = Instant::now();
-    while started.elapsed() < ANSWER_LIMIT {
-        while let Some(block) = health.take_next() {
-            if (block.control_epoch, block.control_seq) == (epoch, seq) {
-                return Some(block.control_result == 1);
-            }
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    None
 }

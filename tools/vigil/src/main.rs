@@ -3,7 +3,9 @@
 mod bindings;
 mod check;
 mod check_publisher;
+mod command;
 mod config;
+mod faults;
 mod findings;
 mod inject;
 mod laboratory;
@@ -33,6 +35,9 @@ enum Command {
     Check(check::Args),
     CheckPublisher(check_publisher::Args),
     Config(config::Args),
+    Faults(faults::Args),
+    Ack(faults::AckArgs),
+    Clear(faults::ClearArgs),
     Inject(inject::Args),
     Record(record::Args),
     #[command(name = "channels")]
@@ -49,6 +54,9 @@ fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::CheckPublisher(args) => check_publisher::run(&args),
         Command::Config(args) => config::run(&args),
+        Command::Faults(args) => faults::run(&args),
+        Command::Ack(args) => faults::acknowledge(&args),
+        Command::Clear(args) => faults::clear(&args),
         Command::Inject(args) => inject::run(&args),
         Command::Record(args) => record::run(&args),
         Command::PrintChannels(args) => print_channels::run(&args),

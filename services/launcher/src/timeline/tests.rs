@@ -92,7 +92,7 @@ fn faults_are_named_and_changes_can_be_injected_again() {
     };
     timeline.add(ServiceName::SensorSim, &injected);
     assert_eq!(timeline.changes(), ["stuck:RM@5"]);
-    let leaf = |name: &str| timeline.namer.nodes.iter().position(|n| n == name).unwrap();
+    let leaf = |name: &str| timeline.namer.tree.index(name).unwrap();
     let (stuck, encoder) = (leaf("RM_STUCK"), leaf("LF_ENC"));
     let set = 1 << stuck | 1 << encoder;
     let several = event(16, EventKind::Diagnosis, MODE_MULTIPLE, set);

@@ -1,7 +1,8 @@
 //! Blocks that topics carry.
 
 use vigil_blocks::{
-    Action, Block, Control, DetectionBelief, FaultBelief, Health, ParticleBlock, SensorFrame, Truth,
+    Action, Block, Control, DetectionBelief, FaultBelief, Faults, Health, ParticleBlock,
+    SensorFrame, Truth,
 };
 
 use super::{Link, Receiver, Sender};
@@ -51,6 +52,7 @@ carried!(
     Control,
     DetectionBelief,
     FaultBelief,
+    Faults,
     Health,
     ParticleBlock,
     SensorFrame,

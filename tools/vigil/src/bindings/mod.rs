@@ -6,8 +6,8 @@ mod python;
 use vigil_blocks::layout::{Field, Layout};
 use vigil_blocks::{
     Action, ActionOutcome, Block, Cause, CauseKind, ControlMode, DetectionBelief, Event,
-    FaultBelief, FaultSet, Header, Health, HealthyBelief, ParticleBlock, RecoveryKind, SensorFrame,
-    SizeKind, Symptoms, Truth, Verdict, WeightedHypothesis,
+    FaultBelief, FaultRecord, FaultSet, Faults, Header, Health, HealthyBelief, ParticleBlock,
+    RecoveryKind, SensorFrame, SizeKind, Symptoms, Truth, Verdict, WeightedHypothesis,
 };
 
 pub use c::header;
@@ -47,12 +47,14 @@ fn structs() -> Vec<Struct> {
         part::<HealthyBelief>(),
         part::<WeightedHypothesis>(),
         part::<Event>(),
+        part::<FaultRecord>(),
         block::<SensorFrame>(),
         block::<DetectionBelief>(),
         block::<ParticleBlock>(),
         block::<FaultBelief>(),
         block::<Action>(),
         block::<Truth>(),
+        block::<Faults>(),
         block::<Health>(),
         block::<Verdict>(),
     ]

@@ -1,0 +1,315 @@
+//! The life of faults: from what is believed in each cycle to what an operator is told.
+//!
+//! A belief comes and goes with the evidence. What is told has a life: a fault is pending until it
+//! was present for `debounce_s`, then active; it is over once it was absent for `clear_s`. One that
+//! latches stays until somebody acknowledges it. A fault that is first unknown and then has a name
+//! is one fault.
+
+mod freeze_frames;
+mod present;
+mod rules;
+mod settings;
+mod tracked;
+
+use vigil_blocks::{
+    Action, FAULTS, FaultBelief, FaultRecord, FaultSource, FaultState, Faults, MODE_UNKNOWN,
+    OverallState, RecoveryKind, SensorFrame, Severity,
+};
+use vigil_robot::FaultTree;
+
+use freeze_frames::FreezeFrames;
+use present::{Present, PresentFaults};
+pub use rules::FaultRuleError;
+use rules::FaultRules;
+pub use settings::{FaultLifeSettings, FaultRule, RuleSeverity};
+use tracked::Tracked;
+
+/// A name that gives way to none holds for so long, ns: with a second opinion that soon passes
+/// there are not two faults. Chosen by hand.
+const UNNAMED_NS: u64 = 10_000_000_000;
+/// Longest time between two steps that counts, ns: while nobody looks, nothing is present or over.
+const STEP_MAX_NS: u64 = 1_000_000_000;
+
+/// What was decided in a cycle.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct CycleDecision {
+    /// See [`Action::action`].
+    pub action: u32,
+    /// See [`Action::kind`].
+    pub kind: u32,
+    /// See [`Action::blind`].
+    pub blind: u32,
+    /// See [`Action::lost_stages`].
+    pub lost_stages: u32,
+}
+
+impl From<&Action> for CycleDecision {
+    fn from(block: &Action) -> Self {
+        Self {
+            action: block.action,
+            kind: block.kind,
+            blind: block.blind,
+            lost_stages: block.lost_stages,
+        }
+    }
+}
+
+/// What the supervisor knows in a cycle.
+#[derive(Debug, Clone, Copy)]
+pub struct LifeInput<'a> {
+    /// `CLOCK_MONOTONIC`, ns.
+    pub now_ns: u64,
+    /// The newest diagnosis; none before the first.
+    pub diagnosis: Option<&'a FaultBelief>,
+    /// What was decided.
+    pub decided: CycleDecision,
+}
+
+/// What an operator asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LifeOrder {
+    /// Somebody knows of the fault of this number; 0: of all.
+    Acknowledge(u64),
+    /// Forget what is over.
+    Clear,
+}
+
+/// Keeps the faults of a graph. Allocates nothing after it was made; never panics on any input.
+pub struct FaultLife {
+    rules: FaultRules,
+    frames: FreezeFrames,
+    present: PresentFaults,
+    tracked: [Tracked; FAULTS],
+    fault_count: u64,
+    dropped_count: u32,
+    /// Something that is present has no place.
+    is_full: bool,
+    revision: u64,
+    overall: OverallState,
+    /// Since when what is present has no name, although something has, ns.
+    unnamed_since_ns: Option<u64>,
+    last_ns: Option<u64>,
+}
+
+impl FaultLife {
+    /// A graph's, with nothing in it.
+    ///
+    /// # Errors
+    /// [`FaultRuleError`] for a rule about what does not exist.
+    pub fn new(settings: &FaultLifeSettings, tree: &FaultTree) -> Result<Self, FaultRuleError> {
+        Ok(Self {
+            rules: FaultRules::new(settings, tree)?,
+            frames: FreezeFrames::new(),
+            present: PresentFaults::new(tree),
+            tracked: [Tracked::default(); FAULTS],
+            fault_count: 0,
+            dropped_count: 0,
+            is_full: false,
+            revision: 1,
+            overall: OverallState::Stale,
+            unnamed_since_ns: None,
+            last_ns: None,
+        })
+    }
+
+    /// Goes on from what another has written last.
+    pub fn restore(&mut self, block: &Faults) {
+        for (tracked, record) in self.tracked.iter_mut().zip(&block.records) {
+            *tracked = Tracked::restored(record);
+        }
+        self.fault_count = block.fault_count;
+        self.dropped_count = block.dropped_count;
+        self.revision = block.revision.wrapping_add(1);
+    }
+
+    /// Keeps a frame, for the freeze frame of a fault that begins about then.
+    pub fn see(&mut self, frame: &SensorFrame) {
+        self.frames.push(frame);
+    }
+
+    /// Takes what is known in a cycle.
+    // Never merged into its caller, so that its instructions can be counted.
+    #[inline(never)]
+    pub fn step(&mut self, input: LifeInput<'_>) {
+        let now_ns = input.now_ns;
+        let last_ns = self.last_ns.replace(now_ns).unwrap_or(now_ns);
+        let passed_ns = now_ns.saturating_sub(last_ns).min(STEP_MAX_NS);
+        self.present.take(input.diagnosis, input.decided);
+        self.hold_names(now_ns);
+        let present = self.present.clone();
+        let was_full = self.is_full;
+        self.is_full = false;
+        for it in present.list() {
+            self.note(it, input);
+        }
+        let drops = self.is_full && !was_full;
+        self.dropped_count = self.dropped_count.saturating_add(u32::from(drops));
+        let mut is_changed = false;
+        for tracked in &mut self.tracked {
+            let key = tracked.key();
+            let is_present = present.list().any(|it| it.key() == key);
+            is_changed |= tracked.advance(is_present, passed_ns, now_ns, &self.rules);
+        }
+        let overall = self.overall_of(input.decided);
+        is_changed |= overall != self.overall;
+        self.overall = overall;
+        self.revision = self.revision.wrapping_add(u64::from(is_changed));
+    }
+
+    /// Carries out an order; false if there is nothing that it could be about.
+    pub fn obey(&mut self, order: LifeOrder, now_ns: u64) -> bool {
+        let mut is_done = false;
+        for tracked in &mut self.tracked {
+            is_done |= match order {
+                LifeOrder::Acknowledge(number) => {
+                    let is_meant = number == 0 || tracked.record.number == number;
+                    is_meant && tracked.acknowledge(now_ns)
+                }
+                LifeOrder::Clear => tracked.forget(),
+            };
+        }
+        self.revision = self.revision.wrapping_add(u64::from(is_done));
+        is_done
+    }
+
+    /// A fault whose state is another than it was told last, once.
+    pub fn take_change(&mut self) -> Option<&FaultRecord> {
+        let changed = self.tracked.iter_mut().find(|it| it.is_untold())?;
+        changed.told();
+        Some(&changed.record)
+    }
+
+    /// Another after each change.
+    #[must_use]
+    pub const fn revision(&self) -> u64 {
+        self.revision
+    }
+
+    /// Writes everything but the header and the operators' orders.
+    pub fn write(&self, block: &mut Faults, tree_hash: u64) {
+        block.tree_hash = tree_hash;
+        block.revision = self.revision;
+        block.fault_count = self.fault_count;
+        block.dropped_count = self.dropped_count;
+        block.overall = self.overall as u32;
+        for (record, tracked) in block.records.iter_mut().zip(&self.tracked) {
+            *record = tracked.record;
+        }
+    }
+
+    /// While what is present has no name, the names that were told hold for a while.
+    fn hold_names(&mut self, now_ns: u64) {
+        let Some(coarse) = self.present.coarse() else {
+            self.unnamed_since_ns = None;
+            return;
+        };
+        let covered = self.present.covered_by(coarse);
+        let named = |it: &&Tracked| it.is_open() && it.record.source == FaultSource::Robot as u32;
+        let names = self.tracked.iter().filter(named).map(|it| it.record.what);
+        let leaves = names.filter(|what| *what != MODE_UNKNOWN);
+        let held = leaves.fold(0, |set, node| set | 1_u64.checked_shl(node).unwrap_or(0));
+        let held = held & covered;
+        if held == 0 {
+            self.unnamed_since_ns = None;
+            return;
+        }
+        let since_ns = *self.unnamed_since_ns.get_or_insert(now_ns);
+        if now_ns.saturating_sub(since_ns) < UNNAMED_NS {
+            self.present.replace(coarse, held);
+        }
+    }
+
+    /// Brings what is present to the fault that it is.
+    fn note(&mut self, it: Present, input: LifeInput<'_>) {
+        let at = self.find(it).unwrap_or(FAULTS);
+        let Some(tracked) = self.tracked.get_mut(at) else {
+            return;
+        };
+        tracked.describe(it, input);
+        let begins = tracked.record.frame_t_capture_ns == 0 && it.source == FaultSource::Robot;
+        if begins && let Some(diagnosis) = input.diagnosis {
+            let onset_ns = match diagnosis.onset_t_capture_ns {
+                0 => diagnosis.alarm_t_capture_ns,
+                onset_ns => onset_ns,
+            };
+            self.frames.freeze(onset_ns, &mut tracked.record);
+        }
+    }
+
+    /// The place of what is present: that of the same fault, or of one that had no name until now,
+    /// or a new one; `None` if no place is free.
+    fn find(&mut self, it: Present) -> Option<usize> {
+        let same = |tracked: &Tracked| tracked.is_kept() && tracked.key() == it.key();
+        if let Some(at) = self.tracked.iter().position(same) {
+            return Some(at);
+        }
+        if it.source == FaultSource::Robot
+            && let Some(at) = self.unnamed(it.what)
+        {
+            self.tracked[at].rename(it.what, &self.rules);
+            return Some(at);
+        }
+        let at = self.free_place();
+        match at {
+            Some(at) => {
+                self.fault_count = self.fault_count.saturating_add(1);
+                self.tracked[at] = Tracked::new(it, self.fault_count, &self.rules);
+            }
+            None => self.is_full = true,
+        }
+        at
+    }
+
+    /// A fault that had a coarser name, which is gone, until this one.
+    fn unnamed(&self, name: u32) -> Option<usize> {
+        let fits = |tracked: &Tracked| {
+            let record = &tracked.record;
+            tracked.is_open()
+                && record.source == FaultSource::Robot as u32
+                && self.present.is_coarser(record.what, name)
+                && !self.present.list().any(|it| it.key() == tracked.key())
+        };
+        self.tracked.iter().position(fits)
+    }
+
+    /// A free place, or that of the fault that was over first.
+    fn free_place(&self) -> Option<usize> {
+        let free = self.tracked.iter().position(|it| !it.is_kept());
+        free.or_else(|| {
+            let over = self.tracked.iter().enumerate();
+            let over = over.filter(|(_, it)| it.record.state() == Some(FaultState::Cleared));
+            over.min_by_key(|(_, it)| it.record.changed_ns)
+                .map(|it| it.0)
+        })
+    }
+
+    fn overall_of(&self, decided: CycleDecision) -> OverallState {
+        use FaultState::{Acknowledged, Active, Latched};
+        let with = |severity: Severity, states: &[FaultState]| {
+            self.tracked.iter().any(|it| {
+                let state = it.record.state();
+                it.record.severity == severity as u32
+                    && state.is_some_and(|state| states.contains(&state))
+            })
+        };
+        let stands = matches!(
+            RecoveryKind::from_repr(decided.kind),
+            Some(RecoveryKind::Stop | RecoveryKind::CallForHelp | RecoveryKind::GiveUp)
+        );
+        let is_present = with(Severity::Fault, &[Active, Acknowledged]);
+        if decided.blind != 0 || decided.kind == RecoveryKind::None as u32 {
+            OverallState::Stale
+        } else if is_present && stands {
+            OverallState::SafeStop
+        } else if is_present || with(Severity::Fault, &[Latched]) {
+            OverallState::Fault
+        } else if with(Severity::Warning, &[Active, Acknowledged, Latched]) {
+            OverallState::Degraded
+        } else {
+            OverallState::Ok
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

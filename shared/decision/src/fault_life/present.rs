@@ -1,0 +1,133 @@
+//! What is present in a cycle.
+
+use vigil_blocks::{
+    FAULT_NODES, FaultBelief, FaultSource, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
+};
+use vigil_robot::FaultTree;
+
+use super::CycleDecision;
+
+/// Bits of [`vigil_blocks::Action::lost_stages`], and the service of each in the order of the data.
+const LOST_STAGES: [(u32, u32); 2] = [(1, 2), (2, 1)];
+
+/// Something that is present.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Present {
+    pub source: FaultSource,
+    /// As [`vigil_blocks::FaultRecord::what`] says it.
+    pub what: u32,
+}
+
+impl Present {
+    /// What tells faults apart. All that can be wrong with the input is one fault.
+    pub(super) const fn key(self) -> (u32, u32) {
+        match self.source {
+            FaultSource::Input => (FaultSource::Input as u32, 0),
+            source => (source as u32, self.what),
+        }
+    }
+}
+
+/// What is present in a cycle.
+#[derive(Debug, Clone)]
+pub(super) struct PresentFaults {
+    /// Leaves below each node; of a leaf, itself.
+    below: [u64; FAULT_NODES],
+    /// Nodes that are no leaves.
+    abstract_nodes: u64,
+    /// Nodes that are reported.
+    nodes: u64,
+    unknown: bool,
+    lost_stages: u32,
+    blind: u32,
+}
+
+impl PresentFaults {
+    pub(super) fn new(tree: &FaultTree) -> Self {
+        let mut below = [0_u64; FAULT_NODES];
+        for leaf in tree.leaves() {
+            let mut at = Some(leaf);
+            while let Some(node) = at {
+                below[node] |= 1 << leaf;
+                at = tree.nodes()[node].parent;
+            }
+        }
+        let leaves = tree.leaves().fold(0_u64, |set, leaf| set | 1 << leaf);
+        let nodes = (1..tree.nodes().len()).fold(0_u64, |set, node| set | 1 << node);
+        Self {
+            below,
+            abstract_nodes: nodes & !leaves,
+            nodes: 0,
+            unknown: false,
+            lost_stages: 0,
+            blind: 0,
+        }
+    }
+
+    /// Takes a cycle. What was diagnosed stays while nothing is seen.
+    pub(super) fn take(&mut self, diagnosis: Option<&FaultBelief>, decided: CycleDecision) {
+        (self.lost_stages, self.blind) = (decided.lost_stages, decided.blind);
+        let Some(diagnosis) = diagnosis.filter(|it| it.reported != MODE_BLIND) else {
+            return;
+        };
+        (self.nodes, self.unknown) = (0, false);
+        match diagnosis.reported {
+            MODE_UNKNOWN => self.unknown = true,
+            MODE_MULTIPLE => self.nodes = diagnosis.sets[0].leaves & !1,
+            node => self.nodes = 1_u64.checked_shl(node).unwrap_or(0) & !1,
+        }
+    }
+
+    /// All that is present.
+    pub(super) fn list(&self) -> impl Iterator<Item = Present> + '_ {
+        let of = |source, what| Present { source, what };
+        let nodes = (1..FAULT_NODES as u32).filter(|node| self.nodes >> node & 1 == 1);
+        let unknown = self.unknown.then_some(MODE_UNKNOWN);
+        let lost = LOST_STAGES.into_iter();
+        let lost = lost.filter(|(bit, _)| self.lost_stages & bit != 0);
+        let blind = (self.blind != 0).then_some(self.blind);
+        nodes
+            .chain(unknown)
+            .map(move |what| of(FaultSource::Robot, what))
+            .chain(lost.map(move |(_, service)| of(FaultSource::Service, service)))
+            .chain(blind.map(move |cause| of(FaultSource::Input, cause)))
+    }
+
+    /// What is reported of the robot that is no leaf; `None` if there is none.
+    pub(super) const fn coarse(&self) -> Option<u32> {
+        if self.unknown {
+            return Some(MODE_UNKNOWN);
+        }
+        match self.nodes & self.abstract_nodes {
+            0 => None,
+            set => Some(set.trailing_zeros()),
+        }
+    }
+
+    /// The leaves that a coarse name may stand for.
+    pub(super) fn covered_by(&self, coarse: u32) -> u64 {
+        let node = self.below.get(coarse as usize).copied();
+        node.unwrap_or(!1)
+    }
+
+    /// Names stand for a coarse one.
+    pub(super) fn replace(&mut self, coarse: u32, names: u64) {
+        if coarse == MODE_UNKNOWN {
+            self.unknown = false;
+        } else {
+            self.nodes &= !1_u64.checked_shl(coarse).unwrap_or(0);
+        }
+        self.nodes |= names;
+    }
+
+    /// True if `what` says less than `name`, and nothing that contradicts it.
+    pub(super) fn is_coarser(&self, what: u32, name: u32) -> bool {
+        let covers = |node: u32| self.below.get(node as usize).copied().unwrap_or(0);
+        match (what, name) {
+            (MODE_UNKNOWN, MODE_UNKNOWN) => false,
+            (MODE_UNKNOWN, _) => true,
+            (_, MODE_UNKNOWN) => false,
+            (node, name) => node != name && covers(node) & covers(name) == covers(name),
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! What an operator says about faults: somebody knows; forget what is over.
+
+use vigil_blocks::{Control, ControlCommand};
+use vigil_cycle::Topic;
+use vigil_cycle::topic::ServiceName;
+use vigil_setup::GraphArgs;
+use vigil_terminal::{CommandError, Outcome};
+
+use super::document::{Document, NamedFault};
+use super::view::View;
+use crate::command::send;
+
+/// Says that somebody knows of a fault.
+///
+/// One that is active stays until it is over; one that is over is cleared.
+#[derive(Debug, clap::Args)]
+pub struct AckArgs {
+    #[command(flatten)]
+    graph: GraphArgs,
+    /// Name or number of the fault, as `vigil faults` lists it; `all` for every one.
+    #[arg(value_name = "FAULT")]
+    fault: String,
+}
+
+/// Forgets faults that are over.
+#[derive(Debug, clap::Args)]
+pub struct ClearArgs {
+    #[command(flatten)]
+    graph: GraphArgs,
+}
+
+/// Acknowledges.
+///
+/// # Errors
+/// A fault that there is not, or that nobody has to acknowledge; a supervisor that does not answer.
+pub fn acknowledge(args: &AckArgs) -> Result<Outcome, CommandError> {
+    let mut view = View::join(&args.graph)?;
+    let document = view.first()?;
+    let number = match args.fault.as_str() {
+        "all" => 0,
+        fault => find(&document, fault)?.number,
+    };
+    let number = u32::try_from(number).map_err(CommandError::failure)?;
+    order(&view, ControlCommand::Acknowledge, number)?
+        .then_some(())
+        .ok_or_else(|| CommandError::failure(format!("{}: nothing to acknowledge", args.fault)))?;
+    eprintln!("acknowledged {}", args.fault);
+    Ok(Outcome::Done)
+}
+
+/// Clears.
+///
+/// # Errors
+/// As [`acknowledge`].
+pub fn clear(args: &ClearArgs) -> Result<Outcome, CommandError> {
+    let view = View::join(&args.graph)?;
+    match order(&view, ControlCommand::Forget, 0)? {
+        true => eprintln!("forgot the faults that were over"),
+        false => eprintln!("no fault was over"),
+    }
+    Ok(Outcome::Done)
+}
+
+fn order(view: &View, command: ControlCommand, fault: u32) -> Result<bool, CommandError> {
+    let topic = Topic::Control(ServiceName::Supervisor);
+    let mut sender = view
+        .graph
+        .sender::<Control>(topic)
+        .map_err(CommandError::failure)?;
+    let block = sender.block();
+    (block.command, block.fault) = (command as u32, fault);
+    let answer = send(&view.graph, ServiceName::Supervisor, sender.as_mut())?;
+    answer.ok_or_else(|| CommandError::failure("the supervisor does not answer"))
+}
+
+/// The fault of a name or number; of several of one name, the one that changed last.
+fn find<'a>(document: &'a Document, fault: &str) -> Result<&'a NamedFault, CommandError> {
+    let is_meant = |it: &&NamedFault| it.name == fault || it.number.to_string() == fault;
+    document.faults.iter().find(is_meant).ok_or_else(|| {
+        let names = document.faults.iter();
+        let names: Vec<String> = names
+            .map(|it| format!("{} ({})", it.name, it.number))
+            .collect();
+        let known = match names.is_empty() {
+            true => "there are none".to_owned(),
+            false => format!("there are {}", names.join(", ")),
+        };
+        CommandError::usage(format!("no fault '{fault}'; {known}"))
+    })
+}
