@@ -68,7 +68,7 @@ impl<'a> CorridorCommander<'a> {
             CorridorArm::Ladder(settings) => Mind::Ladder(stages()?, Escalation::new(settings)),
             CorridorArm::Without => Mind::Without,
             CorridorArm::Explorer(share) => {
-                Mind::Vigil(stages()?, Some(Explorer::new(setup, share, seed)))
+                Mind::Vigil(stages()?, Some(Explorer::new(setup, share, seed)?))
             }
         };
         Ok(Self {

@@ -3,6 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{Action, ActionOutcome, RecoveryKind, SensorFrame};
+use vigil_decision::{SupervisorError, actions_with_outcome};
 use vigil_setup::Setup;
 
 /// Actions with an end that are tried in another's place.
@@ -18,6 +19,7 @@ const TRIED: [RecoveryKind; 4] = [
 struct Tried {
     action: u32,
     kind: RecoveryKind,
+    reports_outcome: bool,
 }
 
 /// Replaces a share of the decisions by one of [`TRIED`], evenly drawn.
@@ -35,17 +37,25 @@ pub(super) struct Explorer {
 }
 
 impl Explorer {
-    pub(super) fn new(setup: &Setup, share: f64, seed: u64) -> Self {
-        let names = setup.decision.actions().iter().zip(0..);
-        let kinds = &setup.file.supervisor.actions;
+    /// # Errors
+    /// A decision model whose observations are no sets of symptoms.
+    pub(super) fn new(setup: &Setup, share: f64, seed: u64) -> Result<Self, SupervisorError> {
+        let supervisor = &setup.file.supervisor;
+        let (kinds, own) = (&supervisor.actions, &supervisor.symptoms);
+        let reports = actions_with_outcome(&setup.decision, own)?;
+        let names = setup.decision.actions().iter().zip(0..).zip(reports);
         let all: Vec<Tried> = names
-            .filter_map(|(name, action)| {
+            .filter_map(|((name, action), reports_outcome)| {
                 let kind = RecoveryKind::from(kinds.get(name)?.kind);
-                Some(Tried { action, kind })
+                Some(Tried {
+                    action,
+                    kind,
+                    reports_outcome,
+                })
             })
             .collect();
         let follow = all.iter().find(|it| it.kind == RecoveryKind::GoOn);
-        Self {
+        Ok(Self {
             share,
             rng: Pcg64Mcg::seed_from_u64(seed ^ 0x7e9_1e57),
             follow: follow.map_or(0, |it| it.action),
@@ -57,7 +67,7 @@ impl Explorer {
             step_count: 0,
             own: 0,
             instead: None,
-        }
+        })
     }
 
     /// Changes an action block to what is done, and its last step to what was done.
@@ -82,13 +92,12 @@ impl Explorer {
         }
     }
 
-    /// As the supervisor counts steps: what was not done is one of following the path, but a new
-    /// path or an opening that was not found is a step of its own.
+    /// As the supervisor counts steps: what was not done is one of following the path, but where the
+    /// model expects an outcome, that none came is a step of its own.
     fn step_action(&self, done: Tried, said: u32, frame: &SensorFrame) -> u32 {
-        let reports = [RecoveryKind::NewPath, RecoveryKind::GoThrough].contains(&done.kind);
         match ActionOutcome::from_repr(frame.action_outcome) {
             Some(ActionOutcome::Succeeded) => done.action,
-            Some(ActionOutcome::Failed) if reports => done.action,
+            Some(ActionOutcome::Failed) if done.reports_outcome => done.action,
             _ if said == self.own => self.follow,
             _ => said,
         }
@@ -114,7 +123,7 @@ mod tests {
                 .unwrap()
                 .setup;
             Self {
-                explorer: Explorer::new(&setup, share, 7),
+                explorer: Explorer::new(&setup, share, 7).unwrap(),
                 names: setup.decision.actions().to_vec(),
                 decisions: 0,
                 steps: 0,

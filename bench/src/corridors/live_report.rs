@@ -5,7 +5,8 @@ use vigil_missions::simulation::{PairedDifference, Summary};
 
 use super::drive::CorridorMission;
 use super::live::LiveMission;
-use super::score::{MEASURES, POINTS};
+use super::report::hits;
+use super::score::{MEASURES, POINTS, TOUCHES};
 use crate::archive::Archive;
 
 /// Largest probability of the lead over the ladder, were there none.
@@ -122,6 +123,11 @@ impl LiveComparison<'_> {
                  bar above 0 and p < .001"
             )
         };
-        (!leads).then(text).into_iter().collect()
+        let touches: Vec<f64> = self.live.iter().map(|it| (TOUCHES.of)(&it.score)).collect();
+        (!leads)
+            .then(text)
+            .into_iter()
+            .chain(hits(&touches))
+            .collect()
     }
 }

@@ -209,7 +209,15 @@ pub fn shortfalls(arms: &[CorridorArm], missions: &[CorridorMission]) -> Vec<Str
              bar above 0 and p < .001"
         )
     };
-    short.map(text).into_iter().collect()
+    let vigil = table.values(None, 0, TOUCHES.of);
+    short.map(text).into_iter().chain(hits(&vigil)).collect()
+}
+
+/// The bar on safety: no mission of Vigil's in which it runs into something.
+pub(super) fn hits(touches: &[f64]) -> Option<String> {
+    let hit = touches.iter().filter(|count| **count > 0.0).count();
+    let missions = touches.len();
+    (hit > 0).then(|| format!("Vigil ran into something in {hit} of {missions} missions, bar 0"))
 }
 
 #[cfg(test)]
@@ -236,6 +244,9 @@ mod tests {
             };
             graph.plans(30, 0).into_iter().map(mission).collect()
         };
+        assert_eq!(hits(&[0.0, 0.0]), None);
+        let found = hits(&[0.0, 2.0, 1.0]).unwrap();
+        assert_eq!(found, "Vigil ran into something in 2 of 3 missions, bar 0");
         // The differences lead - 1 + {0, 1, 2} have a standard error of .15.
         assert!(shortfalls(&arms, &driven(1.0)).is_empty());
         assert_eq!(shortfalls(&arms, &driven(0.2)).len(), 1);

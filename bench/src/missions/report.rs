@@ -256,6 +256,7 @@ fn by_kind(table: &Table<'_>) -> Vec<String> {
     let mut short = Vec::new();
     for kind in Kind::ALL {
         let bar = match kind {
+            // Most of what grows is modelled by nothing: ropes, sinking wheels.
             Kind::Unmodelled | Kind::Growing => UNMODELLED_MIN,
             _ => MODELLED_MIN,
         };

@@ -40,8 +40,11 @@ const DISCOUNTS: [&str; 5] = ["0.95", "0.99", "0.999", "0.9999", "0.99999"];
 const FAMILIES: [&str; 3] = ["part", "repairs", "wear"];
 /// Gap at which a search ends.
 const PRECISION: f64 = 1e-6;
-/// A policy that earns less than its lower bound by more standard errors falls short.
+/// A policy that earns less than its lower bound by more standard errors falls short. Of 31 policies
+/// one in two such tables does so by chance: what does is judged by other missions, so many times
+/// as many.
 const Z_MIN: f64 = -2.0;
+const REPEATED: u64 = 10;
 /// Vectors of a policy, at most.
 const VECTORS_MAX: usize = 200;
 /// A mission is cut off where this is left of the discount, or after so many steps. Chosen: a
@@ -75,7 +78,17 @@ struct Measurement {
     promised: f64,
     mean: f64,
     error: f64,
+    /// By how many standard errors at first, if these missions are a repetition.
+    z_first: Option<f64>,
     appl: Option<f64>,
+}
+
+/// Missions that a policy is simulated in.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    seed: u64,
+    episodes_max: u64,
+    steps_max: usize,
 }
 
 impl Measurement {
@@ -93,7 +106,8 @@ impl Measurement {
         json!({
             "model": self.name, "lower": self.lower, "upper": self.upper, "gap": self.gap(),
             "cpu_s": self.seconds, "vectors": self.vectors, "promised": self.promised,
-            "mean": self.mean, "standard_error": self.error, "z": self.z(), "gap_appl": self.appl,
+            "mean": self.mean, "standard_error": self.error, "z": self.z(),
+            "z_first": self.z_first, "gap_appl": self.appl,
         })
     }
 }
@@ -178,9 +192,14 @@ fn measure(args: &Args, name: &str, model: &Pomdp) -> Result<Measurement, Box<dy
     let all = found.vectors.ok_or("ended before there was a policy")?;
     let mut never = || false;
     let few = compact(model, &all, VECTORS_MAX, &mut Budget::new(&mut never))?;
-    let (mean, error) = earned(args, model, &few.vectors)?;
+    let sample = Sample {
+        seed: 1,
+        episodes_max: args.episodes,
+        steps_max: STEPS_OF_ALL_MAX,
+    };
+    let (mean, error) = earned(sample, model, &few.vectors)?;
     let appl = APPL.iter().find(|(of, _)| *of == name);
-    Ok(Measurement {
+    let mut measured = Measurement {
         name: name.to_owned(),
         lower: found.bracket.lower,
         upper: found.bracket.upper,
@@ -189,14 +208,26 @@ fn measure(args: &Args, name: &str, model: &Pomdp) -> Result<Measurement, Box<dy
         promised: found.bracket.lower - few.loss_mean,
         mean,
         error: error.hypot(few.loss_error),
+        z_first: None,
         appl: appl.map(|(_, gap)| *gap),
-    })
+    };
+    if measured.z() < Z_MIN {
+        measured.z_first = Some(measured.z());
+        let sample = Sample {
+            seed: 2,
+            episodes_max: REPEATED * sample.episodes_max,
+            steps_max: REPEATED as usize * sample.steps_max,
+        };
+        let (mean, error) = earned(sample, model, &few.vectors)?;
+        (measured.mean, measured.error) = (mean, error.hypot(few.loss_error));
+    }
+    Ok(measured)
 }
 
 /// Mean and standard error of what a policy earns; what is cut off at the end of a mission is worth
 /// what the vectors say, at the discount that is left.
 fn earned(
-    args: &Args,
+    sample: Sample,
     model: &Pomdp,
     vectors: &AlphaVectors,
 ) -> Result<(f64, f64), Box<dyn Error>> {
@@ -206,13 +237,14 @@ fn earned(
     let mut agent = PolicyAgent::new(model, decider);
     let enough = (DISCOUNT_LEFT.ln() / model.discount().ln()).ceil() as usize;
     let rules = Rules::endless(model, enough.min(STEPS_MAX));
-    let episodes = args
-        .episodes
-        .min((STEPS_OF_ALL_MAX / rules.steps_max.max(1)) as u64);
+    let episodes = sample
+        .episodes_max
+        .min((sample.steps_max / rules.steps_max.max(1)) as u64);
     let left = model.discount().powf(rules.steps_max as f64);
     let mut earned: Vec<f64> = (0..episodes)
         .map(|number| {
-            let episode = Episode { seed: 1, number };
+            let seed = sample.seed;
+            let episode = Episode { seed, number };
             let sum = drive(model, &mut agent, &rules, episode).discounted;
             sum + left * vectors.value(agent.belief())
         })
@@ -226,7 +258,8 @@ fn say(archive: &mut Archive, args: &Args, found: &[Measurement]) {
         "Bounds of the best value after {} s of processor time, or a gap of {PRECISION:e}. The \
          policy has {VECTORS_MAX} vectors at most; z is by how many standard errors it earned more \
          than its lower bound in {} simulated missions, fewer at high discounts. These last until \
-         {DISCOUNT_LEFT} of the discount is left, at most {STEPS_MAX} steps.\n",
+         {DISCOUNT_LEFT} of the discount is left, at most {STEPS_MAX} steps. Below {Z_MIN} it is \
+         judged by {REPEATED} times as many others.\n",
         args.seconds, args.episodes
     ));
     archive.say("| model | lower | upper | gap | APPL's gap | s | vectors | z |");

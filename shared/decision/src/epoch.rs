@@ -28,7 +28,7 @@ pub(crate) struct SymptomKinds {
     /// Those of them that count while they stand, too.
     standing: u32,
     /// Those that come with an outcome.
-    outcomes: u32,
+    pub(crate) outcomes: u32,
 }
 
 impl SymptomKinds {

@@ -34,5 +34,6 @@ pub use fault_life::{
 };
 pub use inputs::Inputs;
 pub use mapping::Compensation;
+pub use observations::actions_with_outcome;
 pub use settings::{Counts, Evidence, Gate, OwnSymptom, Recovery, RecoveryAction, Settings};
 pub use supervisor::Supervisor;

@@ -5,11 +5,14 @@ use std::collections::BTreeMap;
 use vigil_blocks::Symptoms;
 use vigil_pomdp::Pomdp;
 
+use crate::epoch::SymptomKinds;
 use crate::error::SupervisorError;
 use crate::settings::OwnSymptom;
 
 /// Name of the empty set.
 const NONE: &str = "none";
+/// An outcome of this probability is expected; what is less may be a floor against zeros.
+const EXPECTED: f64 = 0.05;
 
 /// The observation for each set of symptoms that the model knows.
 #[derive(Debug, Clone)]
@@ -68,6 +71,30 @@ impl Observations {
         let at = self.sets.binary_search_by_key(&known, |(set, _)| *set);
         at.ok().map(|at| self.sets[at].1)
     }
+}
+
+/// For each action of a model whose observations are sets of symptoms: whether the model expects an
+/// outcome symptom of it, in some state with a probability of a twentieth or more. Then the model
+/// knows what it says that none came, too.
+///
+/// # Errors
+/// [`SupervisorError`] for an observation that is no set.
+pub fn actions_with_outcome(
+    model: &Pomdp,
+    own: &BTreeMap<String, OwnSymptom>,
+) -> Result<Vec<bool>, SupervisorError> {
+    let (observations, outcomes) = (
+        Observations::new(model, own)?,
+        SymptomKinds::new(own).outcomes,
+    );
+    let expects = |action: usize| {
+        let mut told = observations
+            .sets
+            .iter()
+            .filter(|(set, _)| set & outcomes != 0);
+        told.any(|(_, z)| model.likelihood(action, *z).iter().any(|p| *p >= EXPECTED))
+    };
+    Ok((0..model.actions().len()).map(expects).collect())
 }
 
 /// Bits of a set by its name: its symptoms, joined by `_` in any order.

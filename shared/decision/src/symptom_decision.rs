@@ -14,7 +14,7 @@ use crate::hardware_belief::HardwareBelief;
 use crate::inputs::Inputs;
 use crate::latch::Latch;
 use crate::mapping::{ActionMeaning, Compensation};
-use crate::observations::Observations;
+use crate::observations::{Observations, actions_with_outcome};
 use crate::settings::Settings;
 use crate::state_belief::{MOVED, distance};
 use crate::wheels::Wheels;
@@ -25,8 +25,8 @@ use crate::wheels::Wheels;
 /// says about the hardware is taken over then, and at once when it moves the belief. An action that
 /// is not done mends nothing: where the robot says that it failed, where it takes longer than any
 /// may, and where a symptom rises before its end, the step is one of following the path. Only of
-/// what reports its outcome as an observation (GO, NP) the failure is a step of its own: the model
-/// knows what it says that no outcome came. A set that is impossible after the action, or of which
+/// what reports its outcome as an observation ([`actions_with_outcome`]; GO, NP) the failure is a
+/// step of its own: the model knows what it says that no outcome came. A set that is impossible after the action, or of which
 /// the model has no observation, is counted, and the belief becomes the prediction with 0.01 of the
 /// start belief mixed in.
 ///
@@ -36,6 +36,8 @@ use crate::wheels::Wheels;
 pub(crate) struct SymptomDecision {
     process: DecisionProcess,
     observations: Observations,
+    /// By action: whether it reports its outcome as an observation.
+    reports_outcome: Vec<bool>,
     hardware: Option<HardwareBelief>,
     wheels: Wheels,
     epoch: Epoch,
@@ -60,10 +62,12 @@ impl SymptomDecision {
         let hardware = HardwareBelief::new(model, tree, settings.lost_state.as_deref())?;
         let wheels = Wheels::new(model, actions, tree, robot, compensation)?;
         let observations = Observations::new(model, &settings.symptoms)?;
+        let reports_outcome = actions_with_outcome(model, &settings.symptoms)?;
         process.decision_seq = 1;
         let mut rule = Self {
             process,
             observations,
+            reports_outcome,
             hardware,
             wheels,
             epoch: Epoch::new(SymptomKinds::new(&settings.symptoms)),
@@ -175,10 +179,7 @@ impl SymptomDecision {
     /// of the present action where the model cannot follow.
     fn step_action(&self, end: End) -> usize {
         let action = self.process.choice.action;
-        let reports_outcome = matches!(
-            self.process.kind(action),
-            RecoveryKind::GoThrough | RecoveryKind::NewPath
-        );
+        let reports_outcome = self.reports_outcome[action];
         if end == End::Done || (end == End::Failed && reports_outcome) {
             return action;
         }

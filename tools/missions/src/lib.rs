@@ -1,6 +1,4 @@
-//! Missions of a decision model: [`simulation`] flies them and compares policies, [`learning`]
-//! finds the model's probabilities from recorded ones. Models are written by [`navigation`] (the
-//! paper's), [`exceptions`] (of navigation and hardware) and [`recovery`] (of faults).
+#![doc = include_str!("../README.md")]
 
 mod counting;
 pub mod exceptions;

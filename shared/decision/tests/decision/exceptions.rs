@@ -308,6 +308,45 @@ fn a_symptom_an_outcome_and_an_action_of_ones_own_need_no_code() {
 }
 
 #[test]
+fn an_action_of_ones_own_that_failed_is_the_step_that_the_model_knows_of() {
+    // Docking works in 7 of 10 cases; then DOCKED comes, and else nothing.
+    let model = DOCKING
+        .replace("T: DOCK\n1 0\n1 0", "T: DOCK\n1 0\n0.7 0.3")
+        .replace(
+            "O: DOCK\n0.05 0 0.95 0\n0.05 0 0.95 0",
+            "O: DOCK\n0.05 0 0.95 0\n0.9 0.1 0 0",
+        );
+    let declared = "
+        evidence = 'symptoms'
+        epoch_ms = 5000.0
+        [symptoms]
+        BATTERY = { bit = 8, counts = 'standing' }
+        DOCKED = { bit = 31, counts = 'outcome' }
+        [actions]
+        FP = { kind = 'go_on' }
+        DOCK = { kind = 'own' }
+    ";
+    let mut robot = Navigation::with(&model, &toml::from_str(declared).unwrap());
+    robot.cycle(1 << 8);
+    assert_eq!(robot.kind(), RecoveryKind::Own);
+    let empty = robot.p("EMPTY");
+    robot.ended(ActionOutcome::Failed, 0);
+    // By hand: 0.3 of EMPTY stays and is not seen to dock, the rest docks without DOCKED.
+    let (stays, docks) = (0.3 * empty * 0.9, (1.0 - 0.3 * empty) * 0.05);
+    let expected = stays / (stays + docks);
+    assert!(
+        (robot.p("EMPTY") - expected).abs() < 1e-9,
+        "{}",
+        robot.p("EMPTY")
+    );
+    assert!(expected > empty);
+    assert_eq!(
+        (robot.action.step_action, robot.action.impossible_count),
+        (1, 0)
+    );
+}
+
+#[test]
 fn a_steady_cycle_allocates_nothing_and_no_number_goes_bad() {
     let mut robot = Navigation::joint();
     let before = allocations();

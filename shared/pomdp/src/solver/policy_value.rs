@@ -53,7 +53,10 @@ pub fn policy_value(
         .map(|s| best.value(s) + best.error())
         .collect();
     let highest = most.iter().fold(0.0_f64, |m, v| m.max(*v));
-    let bounds = [vec![trivial(model).lower; states.len()], most];
+    // No policy earns more than who knows the state, nor less than the smallest reward for ever.
+    let ceiling: f64 = model.start().iter().zip(&most).map(|(b, v)| b * v).sum();
+    let floor = trivial(model).lower;
+    let bounds = [vec![floor; states.len()], most];
     let walk = Walk::new(model, policy, beliefs_max, budget)?;
     let chain = Chain::new(discount, walk, &bounds);
     let [lower, upper] = &chain.earned;
@@ -70,8 +73,8 @@ pub fn policy_value(
         .max(if lower.is_finite() { lower.abs() } else { 0.0 });
     let error = (MERGED + excess_mass(model)) * steps * (scale + 2.0 * highest);
     Ok(PolicyValue {
-        lower: lower - error,
-        upper: upper + error,
+        lower: (lower - error).max(floor),
+        upper: (upper + error).min(ceiling),
         beliefs: chain.beyond.len(),
         beyond: beyond.clamp(0.0, 1.0),
     })

@@ -8,7 +8,7 @@ use super::information::Information;
 use super::layout::Layout;
 use super::learned::{Iteration, LearnedModel};
 use super::record::{Record, RecordError};
-use super::sampling;
+use super::starts;
 use vigil_pomdp::ParseError;
 use vigil_pomdp::Pomdp;
 
@@ -97,7 +97,7 @@ pub fn learn(
     for start in 0..settings.starts {
         let mut theta = match start {
             0 => hand.clone(),
-            _ => sampling::around(&layout, &hand, &mut generator),
+            _ => starts::around(&layout, &hand, &mut generator),
         };
         let objective = search.climb(&mut theta, settings, &mut |iteration, like, objective| {
             let iteration = Iteration {

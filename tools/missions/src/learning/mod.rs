@@ -27,7 +27,7 @@ mod layout;
 mod learned;
 mod learner;
 mod record;
-mod sampling;
+mod starts;
 
 pub use expectation::Impossible;
 pub use layout::{Row, Table};
