@@ -92,8 +92,8 @@ impl Explorer {
         }
     }
 
-    /// As the supervisor counts steps: what was not done is one of following the path, but where the
-    /// model expects an outcome, that none came is a step of its own.
+    /// As the supervisor counts steps: what was not done is one of following the path, but where
+    /// the model expects an outcome, that none came is a step of its own.
     fn step_action(&self, done: Tried, said: u32, frame: &SensorFrame) -> u32 {
         match ActionOutcome::from_repr(frame.action_outcome) {
             Some(ActionOutcome::Succeeded) => done.action,

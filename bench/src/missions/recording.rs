@@ -11,19 +11,16 @@
 use std::error::Error;
 
 use vigil_blocks::{Action, RecoveryKind};
+use vigil_decision::MOVED;
+use vigil_decision::state_names::{NEW, SEVERAL, SEVERAL_DRIVABLE, UNKNOWN};
 use vigil_missions::learning::Record;
 use vigil_pomdp::Pomdp;
 
 use super::breakdown::{Cause, PresentFault};
 use super::rules::RuleOutput;
 
-/// A belief that moves by less in an epoch has not been told anything (half the sum of absolute
-/// differences): as much as the supervisor calls a move.
-const MOVED: f64 = 0.05;
 /// What is less than this share of what it grows to is not yet a fault of the model.
 const SEVERE: f64 = 0.5;
-/// End of the name of a state of which evidence comes.
-const NEW: &str = "_NEW";
 /// Observation of an epoch in which nothing is told.
 const NONE: &str = "none";
 
@@ -176,13 +173,13 @@ fn truth(faults: &[PresentFault]) -> Option<&'static str> {
         [one] => Some(match one.cause {
             Cause::Stuck(_) => "STUCK",
             Cause::Encoder(_) => "ENCODER",
-            Cause::Unmodelled => "UNKNOWN",
+            Cause::Unmodelled => UNKNOWN,
         }),
         several => {
             let causes = several.iter().map(|fault| fault.cause);
             Some(match RuleOutput::limp_home(causes) {
-                Some(_) => "SEVERAL_DRIVABLE",
-                None => "SEVERAL",
+                Some(_) => SEVERAL_DRIVABLE,
+                None => SEVERAL,
             })
         }
     }

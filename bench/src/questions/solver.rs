@@ -40,9 +40,9 @@ const DISCOUNTS: [&str; 5] = ["0.95", "0.99", "0.999", "0.9999", "0.99999"];
 const FAMILIES: [&str; 3] = ["part", "repairs", "wear"];
 /// Gap at which a search ends.
 const PRECISION: f64 = 1e-6;
-/// A policy that earns less than its lower bound by more standard errors falls short. Of 31 policies
-/// one in two such tables does so by chance: what does is judged by other missions, so many times
-/// as many.
+/// A policy that earns less than its lower bound by more standard errors falls short. Of 31
+/// policies one in two such tables does so by chance: what does is judged by other missions, so
+/// many times as many.
 const Z_MIN: f64 = -2.0;
 const REPEATED: u64 = 10;
 /// Vectors of a policy, at most.

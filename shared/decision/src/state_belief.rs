@@ -27,7 +27,7 @@ pub(crate) const P_TOLERANCE: f64 = 1e-6;
 /// A belief that has moved by more than this since the last decision (half the sum of absolute
 /// differences) opens another at once. Chosen by hand: it changes no value by more than a twentieth
 /// of its range. Smaller decides in almost every cycle; larger lets a decision wait for its epoch.
-pub(crate) const MOVED: f64 = 0.05;
+pub const MOVED: f64 = 0.05;
 
 /// Less than this changes no decision, whichever state it belongs to.
 const NEGLIGIBLE: f64 = 1e-6;

@@ -6,20 +6,7 @@ use vigil_blocks::AnsweredWheels;
 use vigil_robot::{Description, FaultTree};
 
 use crate::error::SupervisorError;
-
-/// Name of the decision model's state for deviations that no fault model explains.
-const UNKNOWN: &str = "UNKNOWN";
-/// A state X_NEW means the same as X, while evidence still comes. What is in doubt when it ends
-/// stays in doubt.
-const NEW: &str = "_NEW";
-/// Name of the state of all named faults that have no state of their own. It may be of none.
-const FAULT: &str = "FAULT";
-/// Name of the state of two faults or more.
-const SEVERAL: &str = "SEVERAL";
-/// Name of the state of those of them with which a robot can be driven home.
-const DRIVABLE: &str = "SEVERAL_DRIVABLE";
-/// Name of the state after the end of the task. It is never believed: what goes on has not ended.
-const DONE: &str = "DONE";
+use crate::state_names::{DONE, FAULT, NEW, SEVERAL, SEVERAL_DRIVABLE, UNKNOWN};
 
 /// What a state of the decision model stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,7 +90,7 @@ pub(crate) fn leaves(tree: &FaultTree, robot: &Description) -> Vec<Leaf> {
 /// True if a state may have this name because of what it says about the hardware.
 pub(crate) fn is_of_hardware(name: &str, tree: &FaultTree) -> bool {
     let settled = name.strip_suffix(NEW).unwrap_or(name);
-    matches!(settled, UNKNOWN | FAULT | SEVERAL | DRIVABLE)
+    matches!(settled, UNKNOWN | FAULT | SEVERAL | SEVERAL_DRIVABLE)
         || tree
             .nodes()
             .first()
@@ -133,7 +120,7 @@ pub(crate) fn states(
         subject: match name.strip_suffix(NEW).unwrap_or(name) {
             UNKNOWN => Subject::Unknown,
             SEVERAL => Subject::Several,
-            DRIVABLE => Subject::Drivable,
+            SEVERAL_DRIVABLE => Subject::Drivable,
             DONE => Subject::Done,
             name if name == nominal => Subject::Nominal,
             _ => Subject::Fault,

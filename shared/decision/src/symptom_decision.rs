@@ -26,9 +26,9 @@ use crate::wheels::Wheels;
 /// is not done mends nothing: where the robot says that it failed, where it takes longer than any
 /// may, and where a symptom rises before its end, the step is one of following the path. Only of
 /// what reports its outcome as an observation ([`actions_with_outcome`]; GO, NP) the failure is a
-/// step of its own: the model knows what it says that no outcome came. A set that is impossible after the action, or of which
-/// the model has no observation, is counted, and the belief becomes the prediction with 0.01 of the
-/// start belief mixed in.
+/// step of its own: the model knows what it says that no outcome came. A set that is impossible
+/// after the action, or of which the model has no observation, is counted, and the belief becomes
+/// the prediction with 0.01 of the start belief mixed in.
 ///
 /// A call for help, or a task given up, stands until a new run or a reset, whatever is believed
 /// meanwhile: a robot that stands looks healthy. A new run resets the belief, unless its first

@@ -8,6 +8,7 @@ use vigil_robot::{Description, FaultTree, counter_steering};
 use crate::answerable::AnswerableFaults;
 use crate::error::SupervisorError;
 use crate::mapping::{self, ActionMeaning, Compensation};
+use crate::state_belief::MOVED;
 use crate::states::{self, Leaf, LeafKind};
 
 /// A fault is named above this probability: more likely than not.
@@ -15,9 +16,6 @@ const NAMED: f64 = 0.5;
 /// A set that is this many times as probable as the one that is answered is answered instead,
 /// though neither is more likely than not. Chosen by hand.
 const FAR_MORE: f64 = 2.0;
-/// A probability that has moved by more than this opens another decision. Chosen by hand, as for
-/// the belief over states.
-const MOVED: f64 = 0.05;
 
 /// The faults of wheels as the identifier holds them, and the wheels of the present action.
 pub(crate) struct Wheels {

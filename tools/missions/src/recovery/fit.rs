@@ -17,9 +17,10 @@
 //! - How often faults arise, pass and join is not counted: missions for this are drawn with trouble
 //!   in them. Prices are the user's.
 
+use vigil_decision::state_names::NEW;
 use vigil_pomdp::Pomdp;
 
-use super::parameters::{NEW, Parameters};
+use super::parameters::Parameters;
 use crate::counting::{Count, Fit, FittedChances};
 use crate::learning::Record;
 

@@ -1,10 +1,10 @@
 //! From parameters to a `.pomdp` text.
 
+use vigil_decision::state_names::{DONE, NEW, NOMINAL, SEVERAL, SEVERAL_DRIVABLE, UNKNOWN};
+
 use crate::model_text::{line, number};
 
-use super::parameters::{
-    ActionParameters, DRIVABLE, Drivable, Fault, NEW, ParameterError, Parameters,
-};
+use super::parameters::{ActionParameters, Drivable, Fault, ParameterError, Parameters};
 
 const HEAD: &str = "\
 # What to do about a fault. Generated: change the parameters, not this file.
@@ -80,7 +80,7 @@ fn write_transitions(text: &mut String, model: &Model<'_>) -> Result<(), Paramet
     let help = &model.parameters.help.action;
     let [nominal, done] = [0, model.states.len() - 1].map(|state| row(&model.only(state)));
     line(text, &format!("T: {help} : *\n{nominal}"));
-    line(text, &format!("T: {help} : DONE\n{done}"));
+    line(text, &format!("T: {help} : {DONE}\n{done}"));
     Ok(())
 }
 
@@ -128,16 +128,16 @@ fn states(parameters: &Parameters) -> Vec<State<'_>> {
     let faults = parameters.fault.iter();
     let faults = faults.map(|fault| state(&fault.state, Condition::Fault(fault)));
     let drivable = parameters.several.drivable.into_iter();
-    let drivable = drivable.map(|of| state(DRIVABLE, Condition::Drivable(of)));
-    let settled: Vec<State<'_>> = std::iter::once(state("ND", Condition::Nominal))
+    let drivable = drivable.map(|of| state(SEVERAL_DRIVABLE, Condition::Drivable(of)));
+    let settled: Vec<State<'_>> = std::iter::once(state(NOMINAL, Condition::Nominal))
         .chain(faults)
-        .chain([state("SEVERAL", Condition::Several)])
+        .chain([state(SEVERAL, Condition::Several)])
         .chain(drivable)
-        .chain([state("UNKNOWN", Condition::Unknown)])
+        .chain([state(UNKNOWN, Condition::Unknown)])
         .collect();
     let new: Vec<State<'_>> = settled.iter().map(State::renewed).collect();
     let all = settled.into_iter().chain(new);
-    all.chain([state("DONE", Condition::Done)]).collect()
+    all.chain([state(DONE, Condition::Done)]).collect()
 }
 
 impl State<'_> {
@@ -295,7 +295,7 @@ impl Model<'_> {
                 Some(remedied_1_m) if answers(&fault.state) => (remedied_1_m, true),
                 _ => (fault.price_1_m * scale, false),
             },
-            Condition::Drivable(it) if answers(DRIVABLE) => (it.remedied_1_m, true),
+            Condition::Drivable(it) if answers(SEVERAL_DRIVABLE) => (it.remedied_1_m, true),
             Condition::Several | Condition::Drivable(_) => {
                 (parameters.several.price_1_m * scale, false)
             }

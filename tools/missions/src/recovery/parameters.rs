@@ -1,12 +1,7 @@
 //! The parameter file of the recovery model.
 
 use serde::{Deserialize, Serialize};
-
-/// Name of the state of several faults with which a robot can be driven home.
-pub(super) const DRIVABLE: &str = "SEVERAL_DRIVABLE";
-
-/// End of the name of a state of which evidence comes.
-pub(super) const NEW: &str = "_NEW";
+use vigil_decision::state_names::{DONE, NEW, NOMINAL, SEVERAL, SEVERAL_DRIVABLE, UNKNOWN};
 
 /// Everything that the model is made from. Prices are in units of the
 /// user's choice, the same for all.
@@ -227,7 +222,7 @@ impl Parameters {
         if let Some(drivable) = self.several.drivable {
             share("several.drivable.share".into(), drivable.share)?;
         }
-        let always = ["ND", "SEVERAL", DRIVABLE, "UNKNOWN", "DONE"];
+        let always = [NOMINAL, SEVERAL, SEVERAL_DRIVABLE, UNKNOWN, DONE];
         for (at, fault) in self.fault.iter().enumerate() {
             let before = self.fault[..at].iter().map(|other| other.state.as_str());
             let is_taken = before.chain(always).any(|name| name == fault.state);
@@ -248,7 +243,7 @@ impl Parameters {
             let has_drivable = self.several.drivable.is_some();
             let is_there = |state: &str| {
                 let of_faults = self.fault.iter().any(|fault| fault.state == state);
-                of_faults || (has_drivable && state == DRIVABLE)
+                of_faults || (has_drivable && state == SEVERAL_DRIVABLE)
             };
             if let Some(state) = remedied.filter(|state| !is_there(state)) {
                 return Err(ParameterError::NoFault {
