@@ -20,7 +20,7 @@ use super::watch::Watch;
 use crate::load;
 use crate::real_logs::{self, logs};
 use crate::run_time::{period_s, span_s, time_s};
-use crate::simulated::{self, stages};
+use crate::simulated;
 
 /// A run, and what is true in it.
 #[derive(Debug, Clone)]
@@ -225,11 +225,9 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<ScoredRun>, Box<dy
         let period_s = period_s(&case.run);
         let seed = u64::from(case.run.id);
         let truth = case.truth(sensors, taxonomy);
-        let mut watch = Watch {
-            stages: stages(setup, sensors, 1.0 / period_s, seed)?,
-            scorer: Scorer::new(&truth, taxonomy, span_s(&case.run), seed),
-            timeline: Timeline::asked_for(job, seed, name),
-        };
+        let scorer = Scorer::new(&truth, taxonomy, span_s(&case.run), seed);
+        let mut watch = Watch::new(setup, sensors, 1.0 / period_s, seed, scorer)?;
+        watch.timeline = Timeline::asked_for(job, seed, name);
         let mut rng = stream(job.scenario.first_seed + seed, 4);
         let later_s = job.scenario.spread_s * rand::RngExt::random::<f64>(&mut rng);
         // What was recorded has its noise already.
@@ -250,7 +248,7 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<ScoredRun>, Box<dy
         }
         scored.push(ScoredRun {
             sensors: name,
-            run: watch.scorer.finish(),
+            run: watch.finish(),
         });
     }
     Ok(scored)

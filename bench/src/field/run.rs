@@ -22,7 +22,7 @@ use super::scenario::{File, Scenario};
 use super::timeline::Timeline;
 use super::watch::Watch;
 use crate::load;
-use crate::simulated::{stages, taxonomy};
+use crate::simulated::taxonomy;
 
 /// Every run of the scenarios; `scale` multiplies their number, at least one each stays. Recorded
 /// runs are all played, whatever the scale, and none without their files. Of a `timeline` only the
@@ -232,11 +232,11 @@ fn drive(
     let truths: Vec<Vec<Stretch>> = truths.collect();
     let mut watches = Vec::new();
     for ((sensors, name), truth) in sets.iter().zip(&truths) {
-        watches.push(Watch {
-            stages: stages(graph.setup(*sensors).0, *sensors, rate_hz, seed)?,
-            scorer: Scorer::new(truth, graph.setup(*sensors).1, [0.0, scenario.run_s], seed),
-            timeline: Timeline::asked_for(job, seed, name),
-        });
+        let (setup, words) = graph.setup(*sensors);
+        let scorer = Scorer::new(truth, words, [0.0, scenario.run_s], seed);
+        let mut watch = Watch::new(setup, *sensors, rate_hz, seed, scorer)?;
+        watch.timeline = Timeline::asked_for(job, seed, name);
+        watches.push(watch);
     }
     let mut passage = conditions.begin(robot)?;
     let mut gate = ActionGate::new(&robot.limits);
@@ -256,7 +256,7 @@ fn drive(
     Ok(named
         .map(|(watch, (_, sensors))| ScoredRun {
             sensors,
-            run: watch.scorer.finish(),
+            run: watch.finish(),
         })
         .collect())
 }

@@ -1,20 +1,79 @@
 //! The stages of a run, scored.
 
+use std::collections::BTreeMap;
+use std::error::Error;
+
 use vigil_blocks::SensorFrame;
+use vigil_decision::{FaultLife, LifeInput};
+use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Verdict;
-use vigil_evaluation::scoring::field::Scorer;
+use vigil_evaluation::scoring::field::{Run, Scorer};
 use vigil_evaluation::stages::Stages;
+use vigil_setup::Setup;
 
 use super::timeline::Timeline;
+use crate::simulated::stages;
 
 /// The stages of one set of sensors, and their score.
 pub(super) struct Watch<'a> {
     pub(super) stages: Stages,
     pub(super) scorer: Scorer<'a>,
     pub(super) timeline: Option<Timeline>,
+    told: ToldFaults,
 }
 
-impl Watch<'_> {
+/// What an operator is told of faults.
+struct ToldFaults {
+    life: FaultLife,
+    /// By number, how often each became active.
+    activations: BTreeMap<u64, u32>,
+}
+
+impl ToldFaults {
+    fn take(&mut self, t_s: f64, stages: &Stages) {
+        self.life.step(LifeInput {
+            now_ns: (t_s * 1e9) as u64,
+            diagnosis: Some(stages.diagnosis()),
+            decided: stages.action().into(),
+        });
+        while let Some(record) = self.life.take_change() {
+            self.activations.insert(record.number, record.count);
+        }
+    }
+}
+
+impl<'a> Watch<'a> {
+    /// Of the stages of a configuration, but for the sensors they use, the rate and the seed.
+    ///
+    /// # Errors
+    /// If model, robot, tree and settings do not fit together.
+    pub(super) fn new(
+        setup: &Setup,
+        sensors: Sensors,
+        rate_hz: f64,
+        seed: u64,
+        scorer: Scorer<'a>,
+    ) -> Result<Self, Box<dyn Error>> {
+        Ok(Self {
+            stages: stages(setup, sensors, rate_hz, seed)?,
+            scorer,
+            timeline: None,
+            told: ToldFaults {
+                life: vigil_supervisor::fault_life(setup)?,
+                activations: BTreeMap::new(),
+            },
+        })
+    }
+
+    /// The score.
+    pub(super) fn finish(self) -> Run {
+        Run {
+            faults_told: self.told.activations.len(),
+            activations: self.told.activations.values().sum::<u32>() as usize,
+            ..self.scorer.finish()
+        }
+    }
+
     /// Scores what is said at `t_s`, after a frame that was captured then.
     pub(super) fn score(&mut self, t_s: f64, frame: &SensorFrame) {
         let verdict = Verdict {
@@ -22,6 +81,7 @@ impl Watch<'_> {
             ..self.stages.verdict(frame)
         };
         self.scorer.take(&verdict);
+        self.told.take(t_s, &self.stages);
         if let Some(timeline) = &mut self.timeline {
             timeline.take(&verdict, &self.stages, &frame.command);
         }

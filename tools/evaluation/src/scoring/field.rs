@@ -30,6 +30,8 @@
 //!   make the expected calibration error;
 //! - *log score*: -ln p(what is true) 2 s after the first onset, no more than 13.8; several faults
 //!   at once have none, as no probability of just them is published;
+//! - *told*: a fault that became active in the life that an operator sees; *activation*: each time
+//!   that one did;
 //! - *contradiction*: an alarm while the nominal mode has more than one half, or a reported fault
 //!   without alarm.
 //!

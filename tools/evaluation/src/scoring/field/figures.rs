@@ -175,6 +175,8 @@ fn of_time(runs: &[Run]) -> Vec<Figure> {
         ),
         mean("contradiction_s", runs, |run| run.contradiction_s),
         longest(runs),
+        most("faults_told_most", runs, |run| run.faults_told),
+        most("activations_most", runs, |run| run.activations),
         mean("blind_s", runs, |run| run.blind_s),
     ];
     let has_fault = runs.iter().any(|run| run.from_2_s.driven_s > 0.0);
@@ -215,6 +217,7 @@ fn of_health(runs: &[Run]) -> Vec<Figure> {
     let found = [
         rate("alarms", runs, |run| run.alarms, one),
         rate("alarms_per_h", runs, |run| run.alarms, hours),
+        rate("faults_told", runs, |run| run.faults_told, one),
         share("runs_with_alarm", runs, alarmed, false),
         share_of_time(
             "alarm_share",
@@ -404,6 +407,13 @@ fn mean(name: &'static str, runs: &[Run], of: impl Fn(&Run) -> f64) -> Option<Fi
     });
     let worst = worst(runs, false, |run| Some(of(run)));
     Some(Figure::new(name, mean, bounds, values.len()).with_worst(worst))
+}
+
+/// The most of any run, where the life of faults was followed.
+fn most(name: &'static str, runs: &[Run], of: fn(&Run) -> usize) -> Option<Figure> {
+    let worst = worst(runs, false, |run| Some(of(run) as f64));
+    let (value, _) = worst?;
+    Some(Figure::new(name, value, None, runs.len()).with_worst(worst))
 }
 
 /// The longest contradiction of any run.
