@@ -216,7 +216,7 @@ typedef struct {
   double size_sd;
   /* Evidence of evidence_channel then, nat. */
   double evidence;
-  /* Freeze frame: capture time of the frame nearest to the onset, ns; 0 without one. */
+  /* Freeze frame: capture time of the frame nearest to the onset of the most probable fault, ns; 0 without one. */
   uint64_t frame_t_capture_ns;
   /* See SensorFrame::channel_valid, of the freeze frame. */
   uint64_t channel_valid;
@@ -668,8 +668,8 @@ VIGIL_ASSERT(offsetof(vigil_truth, touches) == 140);
 VIGIL_ASSERT(offsetof(vigil_truth, at_goal) == 144);
 VIGIL_ASSERT(offsetof(vigil_truth, reserved) == 148);
 
-#define VIGIL_FAULTS_SCHEMA 0x24aab250bf39a5f7ull
-#define VIGIL_FAULTS_TYPE_NAME "vigil.Faults.v1.24aab250bf39a5f7"
+#define VIGIL_FAULTS_SCHEMA 0x2ee305d770a7813dull
+#define VIGIL_FAULTS_TYPE_NAME "vigil.Faults.v1.2ee305d770a7813d"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -679,27 +679,21 @@ typedef struct {
   uint64_t revision;
   /* Faults so far, kept or not. */
   uint64_t fault_count;
-  /* Faults that nobody sees, as no place was free. */
+  /* What is present and has no place. */
   uint32_t dropped_count;
   /* The overall state: an OverallState. */
   uint32_t overall;
-  /* The last orders of operators that were carried out: epoch of their writer. */
-  uint64_t order_epoch;
-  /* Their sequence number. */
-  uint64_t order_seq;
   /* The faults, in no order. */
   vigil_fault_record records[16];
 } vigil_faults;
-VIGIL_ASSERT(sizeof(vigil_faults) == 9312);
+VIGIL_ASSERT(sizeof(vigil_faults) == 9296);
 VIGIL_ASSERT(offsetof(vigil_faults, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_faults, tree_hash) == 48);
 VIGIL_ASSERT(offsetof(vigil_faults, revision) == 56);
 VIGIL_ASSERT(offsetof(vigil_faults, fault_count) == 64);
 VIGIL_ASSERT(offsetof(vigil_faults, dropped_count) == 72);
 VIGIL_ASSERT(offsetof(vigil_faults, overall) == 76);
-VIGIL_ASSERT(offsetof(vigil_faults, order_epoch) == 80);
-VIGIL_ASSERT(offsetof(vigil_faults, order_seq) == 88);
-VIGIL_ASSERT(offsetof(vigil_faults, records) == 96);
+VIGIL_ASSERT(offsetof(vigil_faults, records) == 80);
 
 #define VIGIL_HEALTH_SCHEMA 0x22ca8e52d533df67ull
 #define VIGIL_HEALTH_TYPE_NAME "vigil.Health.v1.22ca8e52d533df67"

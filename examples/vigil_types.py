@@ -230,7 +230,7 @@ class FaultRecord(ctypes.LittleEndianStructure):
         ("size_sd", ctypes.c_double),
         # Evidence of evidence_channel then, nat.
         ("evidence", ctypes.c_double),
-        # Freeze frame: capture time of the frame nearest to the onset, ns; 0 without one.
+        # Freeze frame: capture time of the frame nearest to the onset of the most probable fault, ns; 0 without one.
         ("frame_t_capture_ns", ctypes.c_uint64),
         # See SensorFrame::channel_valid, of the freeze frame.
         ("channel_valid", ctypes.c_uint64),
@@ -740,8 +740,8 @@ assert Truth.reserved.offset == 148
 
 
 class Faults(ctypes.LittleEndianStructure):
-    SCHEMA = 0x24AAB250BF39A5F7
-    TYPE_NAME = "vigil.Faults.v1.24aab250bf39a5f7"
+    SCHEMA = 0x2EE305D770A7813D
+    TYPE_NAME = "vigil.Faults.v1.2ee305d770a7813d"
 
     @staticmethod
     def type_name():
@@ -756,29 +756,23 @@ class Faults(ctypes.LittleEndianStructure):
         ("revision", ctypes.c_uint64),
         # Faults so far, kept or not.
         ("fault_count", ctypes.c_uint64),
-        # Faults that nobody sees, as no place was free.
+        # What is present and has no place.
         ("dropped_count", ctypes.c_uint32),
         # The overall state: an OverallState.
         ("overall", ctypes.c_uint32),
-        # The last orders of operators that were carried out: epoch of their writer.
-        ("order_epoch", ctypes.c_uint64),
-        # Their sequence number.
-        ("order_seq", ctypes.c_uint64),
         # The faults, in no order.
         ("records", FaultRecord * 16),
     ]
 
 
-assert ctypes.sizeof(Faults) == 9312
+assert ctypes.sizeof(Faults) == 9296
 assert Faults.header.offset == 0
 assert Faults.tree_hash.offset == 48
 assert Faults.revision.offset == 56
 assert Faults.fault_count.offset == 64
 assert Faults.dropped_count.offset == 72
 assert Faults.overall.offset == 76
-assert Faults.order_epoch.offset == 80
-assert Faults.order_seq.offset == 88
-assert Faults.records.offset == 96
+assert Faults.records.offset == 80
 
 
 class Health(ctypes.LittleEndianStructure):

@@ -74,7 +74,7 @@ fn a_fault_lives_from_its_onset_until_it_is_cleared_and_outlives_the_supervisor(
     let again = vigil(&name, &["ack", "1"]);
     assert_eq!((again.0, again.2.trim()), (1, "1: nothing to acknowledge"));
 
-    kill_supervisor(&observer);
+    restart(&observer, "supervisor");
     let document = until(&name, "acknowledged");
     assert_eq!(document["faults"][0]["number"], 1, "{document}");
 
@@ -108,15 +108,15 @@ fn a_fault_lives_from_its_onset_until_it_is_cleared_and_outlives_the_supervisor(
     );
 }
 
-/// Kills the supervisor and waits for another.
-fn kill_supervisor(observer: &Graph) {
+/// Kills a service and waits for another.
+fn restart(observer: &Graph, service: &str) {
     let mut watch = HealthWatch::new(observer);
-    let pid = eventually("the supervisor's process", || {
-        watch.poll().get("supervisor").map(|health| health.pid)
+    let pid = eventually("its process", || {
+        watch.poll().get(service).map(|health| health.pid)
     });
     crate::killing::kill(pid);
-    eventually("another supervisor", || {
-        let health = watch.poll().get("supervisor")?;
+    eventually("another process", || {
+        let health = watch.poll().get(service)?;
         (health.pid != pid && health.cycles > 0).then_some(())
     });
 }

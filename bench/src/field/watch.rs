@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::error::Error;
 
-use vigil_blocks::SensorFrame;
+use vigil_blocks::{Readiness, SensorFrame};
 use vigil_decision::{FaultLife, LifeInput};
 use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Verdict;
@@ -35,6 +35,8 @@ impl ToldFaults {
             now_ns: (t_s * 1e9) as u64,
             diagnosis: Some(stages.diagnosis()),
             decided: stages.action().into(),
+            observes: stages.detection().readiness == Readiness::Armed as u32,
+            silent_services: 0,
         });
         while let Some(record) = self.life.take_change() {
             self.activations.insert(record.number, record.count);

@@ -1,9 +1,10 @@
 //! The faults' life at its ports: frames, decisions and operators' orders in, the block out.
 
 use vigil_blocks::{
-    Action, Block, Control, ControlCommand, EventKind, FaultBelief, FaultRecord, Faults,
-    SensorFrame,
+    Action, Block, Control, ControlCommand, EventKind, FaultBelief, FaultRecord, Faults, Health,
+    Readiness, SensorFrame,
 };
+use vigil_cycle::health::HEALTH_PERIOD_NS;
 use vigil_cycle::{
     Clock, Graph, HealthBoard, KeptBlock, PortError, Receiver, Sender, Stamp, Topic,
     topic::ServiceName,
@@ -12,6 +13,8 @@ use vigil_decision::{CycleDecision, FaultLife, LifeInput, LifeOrder};
 
 /// Longest time between two blocks, ns: a reader takes the supervisor for gone after a few.
 const INTERVAL_NS: u64 = 100_000_000;
+/// A service whose Health is older than this is silent, ns: five of its intervals.
+const SILENCE_NS: u64 = 5 * HEALTH_PERIOD_NS;
 
 /// Keeps the faults, publishes them, and has them ready for a supervisor that replaces this one.
 pub struct FaultBoard {
@@ -19,6 +22,7 @@ pub struct FaultBoard {
     tree_hash: u64,
     frames: Box<dyn Receiver<SensorFrame>>,
     orders: Box<dyn Receiver<Control>>,
+    peers: [PeerHealth; 3],
     faults: Box<dyn Sender<Faults>>,
     /// Where it is kept; nowhere in process.
     kept: Option<KeptBlock<Faults>>,
@@ -26,20 +30,51 @@ pub struct FaultBoard {
     block: Box<Faults>,
     diagnosis: Box<FaultBelief>,
     is_diagnosed: bool,
+    /// A diagnosis of this turn says something of the robot.
+    observes: bool,
     decided: CycleDecision,
     published_ns: Option<u64>,
     revision_published: u64,
-    /// Orders that are not answered yet.
-    answers: Vec<OrderAnswer>,
+    /// Why it could not be published, until the stage can say so.
+    failed: Option<PortError>,
 }
 
-/// What became of an order.
-#[derive(Debug, Clone, Copy)]
-struct OrderAnswer {
-    epoch: u64,
-    seq: u64,
-    command: u32,
-    is_done: bool,
+/// When another service was heard last.
+struct PeerHealth {
+    service: ServiceName,
+    health: Box<dyn Receiver<Health>>,
+    heard_ns: Option<u64>,
+}
+
+impl PeerHealth {
+    fn new(service: ServiceName, graph: &Graph) -> Result<Self, PortError> {
+        Ok(Self {
+            service,
+            health: graph.receiver(Topic::Health(service))?,
+            heard_ns: None,
+        })
+    }
+
+    /// Its bit if it was heard once, and is silent now.
+    fn silent(&mut self, now_ns: u64) -> u32 {
+        for _ in 0..self.health.buffer() {
+            let Some(health) = self.health.take_next() else {
+                break;
+            };
+            self.heard_ns = Some(health.header.t_publish_ns);
+        }
+        let age_ns = self.heard_ns.map(|at_ns| now_ns.saturating_sub(at_ns));
+        u32::from(age_ns.is_some_and(|age_ns| age_ns > SILENCE_NS)) << self.service.index()
+    }
+}
+
+/// An instant as a clock, for the stamp of what is sent then.
+struct Instant(u64);
+
+impl Clock for Instant {
+    fn now_ns(&self) -> u64 {
+        self.0
+    }
 }
 
 impl FaultBoard {
@@ -59,29 +94,35 @@ impl FaultBoard {
             life.restore(&left);
             *block = *left;
         }
-        let orders: Box<dyn Receiver<Control>> =
-            graph.receiver(Topic::Control(ServiceName::Supervisor))?;
+        use ServiceName::{Detector, Identifier, SensorSim, Supervisor};
+        let peer = |service| PeerHealth::new(service, graph);
         Ok(Self {
             life,
             tree_hash,
             frames: graph.receiver(Topic::Sensor)?,
-            answers: Vec::with_capacity(orders.buffer()),
-            orders,
+            orders: graph.receiver(Topic::Control(Supervisor))?,
+            peers: [peer(SensorSim)?, peer(Detector)?, peer(Identifier)?],
             faults: graph.sender(Topic::Faults)?,
             kept,
             block,
             diagnosis: Box::default(),
             is_diagnosed: false,
+            observes: false,
+            failed: None,
             decided: CycleDecision::default(),
             published_ns: None,
             revision_published: 0,
         })
     }
 
-    /// Keeps a diagnosis.
-    pub(crate) fn take(&mut self, diagnosis: &FaultBelief) {
-        *self.diagnosis = *diagnosis;
-        self.is_diagnosed = true;
+    /// Keeps a diagnosis, by a detector that says whether an alarm could rise. One of another fault
+    /// tree is none.
+    pub(crate) fn take(&mut self, diagnosis: &FaultBelief, readiness: u32) {
+        if diagnosis.tree_hash == self.tree_hash {
+            *self.diagnosis = *diagnosis;
+            self.is_diagnosed = true;
+            self.observes = readiness == Readiness::Armed as u32;
+        }
     }
 
     /// Keeps what was decided.
@@ -89,9 +130,9 @@ impl FaultBoard {
         self.decided = action.into();
     }
 
-    /// Lets the faults live for a cycle whose action has been published.
-    pub(crate) fn turn(&mut self, clock: &dyn Clock) -> Result<(), PortError> {
-        let now_ns = clock.now_ns();
+    /// Lets the faults live for a turn, whatever it was, and tells what has changed. What fails is
+    /// told by [`Self::failure`].
+    pub(crate) fn turn(&mut self, health: &mut HealthBoard, now_ns: u64) {
         for _ in 0..self.frames.buffer() {
             let Some(frame) = self.frames.take_next() else {
                 break;
@@ -100,54 +141,44 @@ impl FaultBoard {
                 self.life.see(frame);
             }
         }
+        let silent = self.peers.iter_mut().map(|peer| peer.silent(now_ns));
+        let silent_services = silent.fold(0, |all, bit| all | bit);
         self.life.step(LifeInput {
             now_ns,
             diagnosis: self.is_diagnosed.then_some(&*self.diagnosis),
             decided: self.decided,
+            observes: std::mem::take(&mut self.observes) && self.decided.blind == 0,
+            silent_services,
         });
-        self.obey(now_ns);
-        self.publish(now_ns, clock)
-    }
-
-    /// Tells what has changed, and answers orders.
-    pub(crate) fn report(&mut self, health: &mut HealthBoard, now_ns: u64) {
-        for answer in self.answers.drain(..) {
-            health.answer_control(answer.epoch, answer.seq, answer.is_done);
-            if !answer.is_done {
-                health.event(now_ns, EventKind::Refused, answer.command, 0.0, 0);
-            }
-        }
+        self.obey(health, now_ns);
         while let Some(record) = self.life.take_change() {
             let (what, value) = event(record);
             health.event(now_ns, EventKind::Fault, what, record.p, value);
         }
+        self.failed = self.publish(now_ns).err();
+    }
+
+    /// Why the last block could not be published, once.
+    pub(crate) const fn failure(&mut self) -> Option<PortError> {
+        self.failed.take()
     }
 
     /// Carries out what operators ask for.
-    fn obey(&mut self, now_ns: u64) {
+    fn obey(&mut self, health: &mut HealthBoard, now_ns: u64) {
         for _ in 0..self.orders.buffer() {
             let Some(control) = self.orders.take_next().copied() else {
                 break;
             };
             let order = order(&control).filter(|_| control.header.schema == Control::SCHEMA);
             let is_done = order.is_some_and(|order| self.life.obey(order, now_ns));
-            let (epoch, seq) = (control.header.epoch, control.header.seq);
-            if is_done {
-                (self.block.order_epoch, self.block.order_seq) = (epoch, seq);
-            }
-            let command = control.command;
-            if self.answers.len() < self.answers.capacity() {
-                self.answers.push(OrderAnswer {
-                    epoch,
-                    seq,
-                    command,
-                    is_done,
-                });
+            health.answer_control(control.header.epoch, control.header.seq, is_done);
+            if !is_done {
+                health.event(now_ns, EventKind::Refused, control.command, 0.0, 0);
             }
         }
     }
 
-    fn publish(&mut self, now_ns: u64, clock: &dyn Clock) -> Result<(), PortError> {
+    fn publish(&mut self, now_ns: u64) -> Result<(), PortError> {
         let is_changed = self.life.revision() != self.revision_published;
         let passed_ns = self.published_ns.map(|at_ns| now_ns.saturating_sub(at_ns));
         if !is_changed && passed_ns.is_some_and(|passed_ns| passed_ns < INTERVAL_NS) {
@@ -162,7 +193,7 @@ impl FaultBoard {
             t_schedule_ns: now_ns,
             t_capture_ns: now_ns,
         };
-        self.faults.send(stamp, clock)?;
+        self.faults.send(stamp, &Instant(now_ns))?;
         (self.published_ns, self.revision_published) = (Some(now_ns), self.life.revision());
         Ok(())
     }

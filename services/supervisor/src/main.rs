@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use vigil_blocks::FaultBelief;
-use vigil_cycle::serve::{self, ServeError};
+use vigil_cycle::serve;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{KeptBlock, Topic};
 use vigil_decision::{FaultLife, Supervisor};
@@ -30,9 +30,11 @@ fn main() -> ExitCode {
         |(setup, (supervisor, life))| {
             let plan = setup.plan(ServiceName::Supervisor, args.leave());
             serve::stage::<FaultBelief, _>(&plan, Topic::Diagnosis, |graph| {
-                let kept = KeptBlock::open(&setup.domain()?.faults_file());
-                let kept = kept.map_err(|e| ServeError::Build(format!("kept faults: {e}")))?;
-                let board = FaultBoard::new(life, setup.tree.hash(), graph, Some(kept))?;
+                let file = setup.domain()?.faults_file();
+                // Without it a supervisor that replaces this one begins without faults.
+                let kept = KeptBlock::open(&file)
+                    .inspect_err(|error| eprintln!("supervisor: {}: {error}", file.display()));
+                let board = FaultBoard::new(life, setup.tree.hash(), graph, kept.ok())?;
                 let valid_ns = validity_ns(&setup);
                 Ok(SupervisorStage::new(supervisor, board, graph, valid_ns)?)
             })

@@ -169,7 +169,7 @@ impl Stage for SupervisorStage {
                 };
                 self.supervisor
                     .step(Entry::Frame(inputs), self.action.block());
-                self.board.take(diagnosis);
+                self.board.take(diagnosis, self.detection.readiness);
                 self.detection_is_new = false;
                 intake.stepped(header, cause.frame());
             }
@@ -219,10 +219,10 @@ impl Stage for SupervisorStage {
             },
         };
         self.board.decide(action);
-        let published_ns = self.action.send(stamp, clock)?;
-        // Operators wait for it, not the robot: after the action.
-        self.board.turn(clock)?;
-        Ok(published_ns)
+        if let Some(failure) = self.board.failure() {
+            return Err(failure);
+        }
+        self.action.send(stamp, clock)
     }
 
     fn prepare(&mut self) -> Result<(), PortError> {
@@ -236,7 +236,7 @@ impl Stage for SupervisorStage {
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         health.add_input(&self.detection_account);
         self.report(health, now_ns);
-        self.board.report(health, now_ns);
+        self.board.turn(health, now_ns);
         let LastDecision {
             seq,
             action,

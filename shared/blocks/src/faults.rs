@@ -30,7 +30,8 @@ pub struct FaultRecord, size 576 {
     pub size_sd: f64,
     /// Evidence of `evidence_channel` then, nat.
     pub evidence: f64,
-    /// Freeze frame: capture time of the frame nearest to the onset, ns; 0 without one.
+    /// Freeze frame: capture time of the frame nearest to the onset of the most probable fault, ns;
+    /// 0 without one.
     pub frame_t_capture_ns: u64,
     /// See [`crate::SensorFrame::channel_valid`], of the freeze frame.
     pub channel_valid: u64,
@@ -68,7 +69,7 @@ pub struct FaultRecord, size 576 {
 
 block! {
     /// Written by the supervisor whenever something changes, and ten times a second.
-    pub struct Faults, size 9312 {
+    pub struct Faults, size 9296 {
         /// Common header.
         pub header: Header,
         /// Hash of the fault tree that gives the nodes their names.
@@ -77,14 +78,10 @@ block! {
         pub revision: u64,
         /// Faults so far, kept or not.
         pub fault_count: u64,
-        /// Faults that nobody sees, as no place was free.
+        /// What is present and has no place.
         pub dropped_count: u32,
         /// The overall state: an [`OverallState`].
         pub overall: u32,
-        /// The last orders of operators that were carried out: epoch of their writer.
-        pub order_epoch: u64,
-        /// Their sequence number.
-        pub order_seq: u64,
         /// The faults, in no order.
         pub records: [FaultRecord; FAULTS],
     }

@@ -17,8 +17,6 @@ const WORDS: usize = 2;
 /// allocates nothing; what was written outlives a process that is killed.
 pub struct KeptBlock<T: Block> {
     copies: NonNull<u64>,
-    /// Held open: the mapping is of this file.
-    _file: File,
     number: u64,
     kind: PhantomData<T>,
 }
@@ -43,8 +41,8 @@ impl<T: Block> KeptBlock<T> {
             .open(path)?;
         if file.metadata()?.len() != Self::BYTES as u64 {
             file.set_len(0)?;
-            file.set_len(Self::BYTES as u64)?;
         }
+        allocate(&file, Self::BYTES)?;
         // SAFETY: a new shared mapping of a file that is as long as the mapping; the kernel chooses
         // its place, and the result is checked.
         #[allow(unsafe_code)]
@@ -53,7 +51,7 @@ impl<T: Block> KeptBlock<T> {
                 std::ptr::null_mut(),
                 Self::BYTES,
                 libc::PROT_READ | libc::PROT_WRITE,
-                libc::MAP_SHARED,
+                libc::MAP_SHARED | libc::MAP_POPULATE,
                 file.as_raw_fd(),
                 0,
             )
@@ -64,7 +62,6 @@ impl<T: Block> KeptBlock<T> {
         let copies = NonNull::new(mapped.cast::<u64>()).ok_or_else(io::Error::last_os_error)?;
         let mut kept = Self {
             copies,
-            _file: file,
             number: 0,
             kind: PhantomData,
         };
@@ -78,6 +75,19 @@ impl<T: Block> KeptBlock<T> {
         self.newest().map(|(_, block)| block)
     }
 
+    /// The same of a file that another process keeps, perhaps just now; nothing is made or changed.
+    #[must_use]
+    pub fn read_file(path: &Path) -> Option<Box<T>> {
+        let bytes = std::fs::read(path).ok()?;
+        let words: Vec<u64> = bytes
+            .chunks_exact(8)
+            .map(|word| u64::from_ne_bytes(word.try_into().unwrap_or_default()))
+            .collect();
+        let copies = words.chunks_exact(Self::COPY).take(2);
+        let newest = copies.filter_map(whole).max_by_key(|(number, _)| *number);
+        newest.map(|(_, block)| block)
+    }
+
     /// Writes a block over the older copy.
     pub fn write(&mut self, block: &T) {
         self.number += 1;
@@ -89,22 +99,14 @@ impl<T: Block> KeptBlock<T> {
     }
 
     fn newest(&self) -> Option<(u64, Box<T>)> {
-        let whole = (0..2).filter_map(|at| self.whole(at));
+        let whole = (0..2).filter_map(|at| whole(self.copy(at)));
         whole.max_by_key(|(number, _)| *number)
     }
 
-    /// A copy, if it is whole.
-    fn whole(&self, at: usize) -> Option<(u64, Box<T>)> {
-        let words = self.copy(at);
-        let bytes = bytemuck::cast_slice::<u64, u8>(&words[WORDS..]);
-        let number = words[0];
-        let is_whole = number != 0 && words[1] == hash(number, bytes);
-        is_whole.then(|| (number, Box::new(bytemuck::pod_read_unaligned(bytes))))
-    }
-
     fn copy(&self, at: usize) -> &[u64] {
-        // SAFETY: the mapping holds two copies of COPY words and lives as long as self; nobody
-        // else writes it while a service that keeps a block lives.
+        // SAFETY: the mapping holds two copies of COPY words and lives as long as self. Nobody else
+        // writes it: a service keeps a block only once it holds its topics, of which each has one
+        // writer.
         #[allow(unsafe_code)]
         unsafe {
             std::slice::from_raw_parts(self.copies.as_ptr().add(at % 2 * Self::COPY), Self::COPY)
@@ -131,6 +133,26 @@ impl<T: Block> Drop for KeptBlock<T> {
     }
 }
 
+/// The block of a copy with its number, if it is whole.
+fn whole<T: Block>(words: &[u64]) -> Option<(u64, Box<T>)> {
+    let bytes = bytemuck::cast_slice::<u64, u8>(&words[WORDS..]);
+    let number = words[0];
+    let is_whole = number != 0 && words[1] == hash(number, bytes);
+    is_whole.then(|| (number, Box::new(bytemuck::pod_read_unaligned(bytes))))
+}
+
+/// Gives a file so many bytes that are there: a store to a mapping of bytes that a full disk has no
+/// room for would end the process.
+fn allocate(file: &File, bytes: usize) -> io::Result<()> {
+    // SAFETY: a plain system call on a descriptor that is open.
+    #[allow(unsafe_code)]
+    let error = unsafe { libc::posix_fallocate(file.as_raw_fd(), 0, bytes as libc::off_t) };
+    match error {
+        0 => Ok(()),
+        error => Err(io::Error::from_raw_os_error(error)),
+    }
+}
+
 /// Of a copy's number and bytes: one that is half written has another.
 fn hash(number: u64, bytes: &[u8]) -> u64 {
     fnv1a::hash(fnv1a::hash_u64(fnv1a::BASIS, number), bytes)
@@ -150,8 +172,11 @@ mod tests {
     }
 
     fn read(path: &Path) -> Option<u32> {
+        let beside = KeptBlock::<Control>::read_file(path).map(|block| block.fault);
         let kept = KeptBlock::<Control>::open(path).unwrap();
-        kept.read().map(|block| block.fault)
+        let read = kept.read().map(|block| block.fault);
+        assert_eq!(read, beside);
+        read
     }
 
     #[test]

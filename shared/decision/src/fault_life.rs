@@ -27,8 +27,9 @@ use tracked::Tracked;
 /// A name that gives way to none holds for so long, ns: with a second opinion that soon passes
 /// there are not two faults. Chosen by hand.
 const UNNAMED_NS: u64 = 10_000_000_000;
-/// Longest time between two steps that counts, ns: while nobody looks, nothing is present or over.
-const STEP_MAX_NS: u64 = 1_000_000_000;
+/// Longest time between two steps that counts, ns: what nobody has looked at is neither present nor
+/// over. Two periods at 10 Hz.
+const STEP_MAX_NS: u64 = 200_000_000;
 
 /// What was decided in a cycle.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -39,8 +40,6 @@ pub struct CycleDecision {
     pub kind: u32,
     /// See [`Action::blind`].
     pub blind: u32,
-    /// See [`Action::lost_stages`].
-    pub lost_stages: u32,
 }
 
 impl From<&Action> for CycleDecision {
@@ -49,7 +48,6 @@ impl From<&Action> for CycleDecision {
             action: block.action,
             kind: block.kind,
             blind: block.blind,
-            lost_stages: block.lost_stages,
         }
     }
 }
@@ -63,6 +61,11 @@ pub struct LifeInput<'a> {
     pub diagnosis: Option<&'a FaultBelief>,
     /// What was decided.
     pub decided: CycleDecision,
+    /// True if this cycle says something of the robot: a frame was diagnosed, and an alarm could
+    /// have risen. Else what is known of the robot is held.
+    pub observes: bool,
+    /// Services that have been silent for too long, as bits in the order of the data.
+    pub silent_services: u32,
 }
 
 /// What an operator asks for.
@@ -81,13 +84,14 @@ pub struct FaultLife {
     present: PresentFaults,
     tracked: [Tracked; FAULTS],
     fault_count: u64,
+    /// What is present and has no place.
     dropped_count: u32,
-    /// Something that is present has no place.
-    is_full: bool,
     revision: u64,
+    /// Something has changed in this step.
+    is_changed: bool,
     overall: OverallState,
-    /// Since when what is present has no name, although something has, ns.
-    unnamed_since_ns: Option<u64>,
+    /// For how long what is present has had no name, although something has one, ns.
+    unnamed_ns: u64,
     last_ns: Option<u64>,
 }
 
@@ -104,10 +108,10 @@ impl FaultLife {
             tracked: [Tracked::default(); FAULTS],
             fault_count: 0,
             dropped_count: 0,
-            is_full: false,
             revision: 1,
+            is_changed: false,
             overall: OverallState::Stale,
-            unnamed_since_ns: None,
+            unnamed_ns: 0,
             last_ns: None,
         })
     }
@@ -118,7 +122,6 @@ impl FaultLife {
             *tracked = Tracked::restored(record);
         }
         self.fault_count = block.fault_count;
-        self.dropped_count = block.dropped_count;
         self.revision = block.revision.wrapping_add(1);
     }
 
@@ -134,25 +137,26 @@ impl FaultLife {
         let now_ns = input.now_ns;
         let last_ns = self.last_ns.replace(now_ns).unwrap_or(now_ns);
         let passed_ns = now_ns.saturating_sub(last_ns).min(STEP_MAX_NS);
-        self.present.take(input.diagnosis, input.decided);
-        self.hold_names(now_ns);
+        self.present.take(input);
+        self.hold_names(if input.observes { passed_ns } else { 0 });
         let present = self.present.clone();
-        let was_full = self.is_full;
-        self.is_full = false;
+        let dropped = std::mem::take(&mut self.dropped_count);
         for it in present.list() {
             self.note(it, input);
         }
-        let drops = self.is_full && !was_full;
-        self.dropped_count = self.dropped_count.saturating_add(u32::from(drops));
-        let mut is_changed = false;
+        self.is_changed |= dropped != self.dropped_count;
         for tracked in &mut self.tracked {
             let key = tracked.key();
             let is_present = present.list().any(|it| it.key() == key);
-            is_changed |= tracked.advance(is_present, passed_ns, now_ns, &self.rules);
+            // Of the robot nothing is over, and nothing lasts, while nothing is seen of it.
+            let counts = !tracked.is_of_robot() || input.observes;
+            let passed_ns = if counts { passed_ns } else { 0 };
+            self.is_changed |= tracked.advance(is_present, passed_ns, now_ns, &self.rules);
         }
         let overall = self.overall_of(input.decided);
-        is_changed |= overall != self.overall;
+        self.is_changed |= overall != self.overall;
         self.overall = overall;
+        let is_changed = std::mem::take(&mut self.is_changed);
         self.revision = self.revision.wrapping_add(u64::from(is_changed));
     }
 
@@ -185,7 +189,7 @@ impl FaultLife {
         self.revision
     }
 
-    /// Writes everything but the header and the operators' orders.
+    /// Writes everything but the header.
     pub fn write(&self, block: &mut Faults, tree_hash: u64) {
         block.tree_hash = tree_hash;
         block.revision = self.revision;
@@ -198,40 +202,43 @@ impl FaultLife {
     }
 
     /// While what is present has no name, the names that were told hold for a while.
-    fn hold_names(&mut self, now_ns: u64) {
+    fn hold_names(&mut self, passed_ns: u64) {
         let Some(coarse) = self.present.coarse() else {
-            self.unnamed_since_ns = None;
+            self.unnamed_ns = 0;
             return;
         };
         let covered = self.present.covered_by(coarse);
-        let named = |it: &&Tracked| it.is_open() && it.record.source == FaultSource::Robot as u32;
+        let named = |it: &&Tracked| it.is_open() && it.is_of_robot();
         let names = self.tracked.iter().filter(named).map(|it| it.record.what);
         let leaves = names.filter(|what| *what != MODE_UNKNOWN);
         let held = leaves.fold(0, |set, node| set | 1_u64.checked_shl(node).unwrap_or(0));
         let held = held & covered;
         if held == 0 {
-            self.unnamed_since_ns = None;
+            self.unnamed_ns = 0;
             return;
         }
-        let since_ns = *self.unnamed_since_ns.get_or_insert(now_ns);
-        if now_ns.saturating_sub(since_ns) < UNNAMED_NS {
+        self.unnamed_ns = self.unnamed_ns.saturating_add(passed_ns);
+        if self.unnamed_ns < UNNAMED_NS {
             self.present.replace(coarse, held);
         }
     }
 
     /// Brings what is present to the fault that it is.
     fn note(&mut self, it: Present, input: LifeInput<'_>) {
-        let at = self.find(it).unwrap_or(FAULTS);
-        let Some(tracked) = self.tracked.get_mut(at) else {
+        let Some(at) = self.find(it) else {
+            self.dropped_count = self.dropped_count.saturating_add(1);
             return;
         };
+        let tracked = &mut self.tracked[at];
+        let is_of_robot = it.source == FaultSource::Robot;
+        if is_of_robot && !input.observes {
+            return;
+        }
         tracked.describe(it, input);
-        let begins = tracked.record.frame_t_capture_ns == 0 && it.source == FaultSource::Robot;
+        let begins = tracked.record.frame_t_capture_ns == 0 && is_of_robot;
         if begins && let Some(diagnosis) = input.diagnosis {
-            let onset_ns = match diagnosis.onset_t_capture_ns {
-                0 => diagnosis.alarm_t_capture_ns,
-                onset_ns => onset_ns,
-            };
+            let known = [diagnosis.onset_t_capture_ns, diagnosis.alarm_t_capture_ns];
+            let onset_ns = known.into_iter().find(|at_ns| *at_ns != 0);
             self.frames.freeze(onset_ns, &mut tracked.record);
         }
     }
@@ -240,22 +247,27 @@ impl FaultLife {
     /// or a new one; `None` if no place is free.
     fn find(&mut self, it: Present) -> Option<usize> {
         let same = |tracked: &Tracked| tracked.is_kept() && tracked.key() == it.key();
-        if let Some(at) = self.tracked.iter().position(same) {
+        let same = self.tracked.iter().position(same);
+        if let Some(at) = same.filter(|at| self.tracked[*at].is_open()) {
             return Some(at);
         }
-        if it.source == FaultSource::Robot
-            && let Some(at) = self.unnamed(it.what)
-        {
+        let unnamed = match it.source {
+            FaultSource::Robot => self.unnamed(it.what),
+            _ => None,
+        };
+        if let Some(at) = unnamed {
+            let earlier = same.map(|at| std::mem::take(&mut self.tracked[at]));
             self.tracked[at].rename(it.what, &self.rules);
+            if let Some(earlier) = earlier {
+                self.tracked[at].goes_on(&earlier);
+            }
+            self.is_changed = true;
             return Some(at);
         }
-        let at = self.free_place();
-        match at {
-            Some(at) => {
-                self.fault_count = self.fault_count.saturating_add(1);
-                self.tracked[at] = Tracked::new(it, self.fault_count, &self.rules);
-            }
-            None => self.is_full = true,
+        let at = same.or_else(|| self.free_place());
+        if let (None, Some(at)) = (same, at) {
+            self.fault_count = self.fault_count.saturating_add(1);
+            self.tracked[at] = Tracked::new(it, self.fault_count, &self.rules);
         }
         at
     }
@@ -265,7 +277,7 @@ impl FaultLife {
         let fits = |tracked: &Tracked| {
             let record = &tracked.record;
             tracked.is_open()
-                && record.source == FaultSource::Robot as u32
+                && tracked.is_of_robot()
                 && self.present.is_coarser(record.what, name)
                 && !self.present.list().any(|it| it.key() == tracked.key())
         };

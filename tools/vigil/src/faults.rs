@@ -19,7 +19,8 @@ const POLL: Duration = Duration::from_millis(50);
 
 /// Lists the faults of a running graph: what failed, since when, and whether somebody knows.
 ///
-/// Outcome 0 if there is none to look after, 1 while a fault is active or latched.
+/// Outcome 0 if there is none to look after, 1 while a fault is active or latched, or nothing is
+/// known.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -50,7 +51,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let mut heard = Instant::now();
     while !vigil_cycle::signal::stop_requested() {
         std::thread::sleep(POLL);
-        let newest = view.newest();
+        let newest = view.newest()?;
         if newest.is_some() {
             heard = Instant::now();
         }

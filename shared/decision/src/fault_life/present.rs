@@ -5,10 +5,10 @@ use vigil_blocks::{
 };
 use vigil_robot::FaultTree;
 
-use super::CycleDecision;
+use super::LifeInput;
 
-/// Bits of [`vigil_blocks::Action::lost_stages`], and the service of each in the order of the data.
-const LOST_STAGES: [(u32, u32); 2] = [(1, 2), (2, 1)];
+/// Services of a graph.
+const SERVICES: u32 = 4;
 
 /// Something that is present.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,7 +38,7 @@ pub(super) struct PresentFaults {
     /// Nodes that are reported.
     nodes: u64,
     unknown: bool,
-    lost_stages: u32,
+    silent_services: u32,
     blind: u32,
 }
 
@@ -59,23 +59,25 @@ impl PresentFaults {
             abstract_nodes: nodes & !leaves,
             nodes: 0,
             unknown: false,
-            lost_stages: 0,
+            silent_services: 0,
             blind: 0,
         }
     }
 
     /// Takes a cycle. What was diagnosed stays while nothing is seen.
-    pub(super) fn take(&mut self, diagnosis: Option<&FaultBelief>, decided: CycleDecision) {
-        (self.lost_stages, self.blind) = (decided.lost_stages, decided.blind);
+    pub(super) fn take(&mut self, input: LifeInput<'_>) {
+        (self.silent_services, self.blind) = (input.silent_services, input.decided.blind);
+        let diagnosis = input.diagnosis.filter(|_| input.observes);
         let Some(diagnosis) = diagnosis.filter(|it| it.reported != MODE_BLIND) else {
             return;
         };
-        (self.nodes, self.unknown) = (0, false);
-        match diagnosis.reported {
-            MODE_UNKNOWN => self.unknown = true,
-            MODE_MULTIPLE => self.nodes = diagnosis.sets[0].leaves & !1,
-            node => self.nodes = 1_u64.checked_shl(node).unwrap_or(0) & !1,
-        }
+        let nodes = match diagnosis.reported {
+            MODE_UNKNOWN => 0,
+            // What is reported is held for a while, and the sets may say another thing by then.
+            MODE_MULTIPLE => several(diagnosis).unwrap_or(self.nodes),
+            node => 1_u64.checked_shl(node).unwrap_or(0) & !1,
+        };
+        (self.nodes, self.unknown) = (nodes, diagnosis.reported == MODE_UNKNOWN);
     }
 
     /// All that is present.
@@ -83,13 +85,12 @@ impl PresentFaults {
         let of = |source, what| Present { source, what };
         let nodes = (1..FAULT_NODES as u32).filter(|node| self.nodes >> node & 1 == 1);
         let unknown = self.unknown.then_some(MODE_UNKNOWN);
-        let lost = LOST_STAGES.into_iter();
-        let lost = lost.filter(|(bit, _)| self.lost_stages & bit != 0);
+        let silent = (0..SERVICES).filter(|service| self.silent_services >> service & 1 == 1);
         let blind = (self.blind != 0).then_some(self.blind);
         nodes
             .chain(unknown)
             .map(move |what| of(FaultSource::Robot, what))
-            .chain(lost.map(move |(_, service)| of(FaultSource::Service, service)))
+            .chain(silent.map(move |service| of(FaultSource::Service, service)))
             .chain(blind.map(move |cause| of(FaultSource::Input, cause)))
     }
 
@@ -130,4 +131,11 @@ impl PresentFaults {
             (node, name) => node != name && covers(node) & covers(name) == covers(name),
         }
     }
+}
+
+/// The most probable set of two faults or more.
+fn several(diagnosis: &FaultBelief) -> Option<u64> {
+    let sets = diagnosis.sets.iter().map(|set| set.leaves & !1);
+    sets.take(diagnosis.set_count as usize)
+        .find(|leaves| leaves.count_ones() > 1)
 }

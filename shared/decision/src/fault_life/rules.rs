@@ -39,7 +39,13 @@ impl FaultRules {
         settings: &FaultLifeSettings,
         tree: &FaultTree,
     ) -> Result<Self, FaultRuleError> {
-        let plain = rule(settings, &FaultRule::default());
+        let ns = |s: f64| (s * 1e9) as u64;
+        let plain = Rule {
+            debounce_ns: ns(settings.debounce_s),
+            clear_ns: ns(settings.clear_s),
+            latches: settings.latch,
+            severity: Severity::Fault,
+        };
         let mut rules = Self {
             nodes: [plain; FAULT_NODES],
             unknown: plain,
@@ -63,7 +69,7 @@ impl FaultRules {
                 (_, _, Some(service)) => &mut rules.services[service],
                 _ => return Err(unknown(name, tree)),
             };
-            *place = rule(settings, own);
+            *place = place.changed(own);
         }
         Ok(rules)
     }
@@ -80,13 +86,16 @@ impl FaultRules {
     }
 }
 
-fn rule(settings: &FaultLifeSettings, own: &FaultRule) -> Rule {
-    let ns = |s: f64| (s * 1e9) as u64;
-    Rule {
-        debounce_ns: ns(own.debounce_s.unwrap_or(settings.debounce_s)),
-        clear_ns: ns(own.clear_s.unwrap_or(settings.clear_s)),
-        latches: own.latch.unwrap_or(settings.latch),
-        severity: own.severity.into(),
+impl Rule {
+    /// The same but for what `own` says.
+    fn changed(self, own: &FaultRule) -> Self {
+        let ns = |s: f64| (s * 1e9) as u64;
+        Self {
+            debounce_ns: own.debounce_s.map_or(self.debounce_ns, ns),
+            clear_ns: own.clear_s.map_or(self.clear_ns, ns),
+            latches: own.latch.unwrap_or(self.latches),
+            severity: own.severity.map_or(self.severity, Severity::from),
+        }
     }
 }
 

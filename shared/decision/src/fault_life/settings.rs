@@ -11,7 +11,7 @@ use vigil_blocks::Severity;
 #[derive(Debug, Clone, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FaultLifeSettings {
-    /// A fault is told once it was present for so long.
+    /// A fault is told once it was present for so long; what flickers adds up.
     #[default(0.3)]
     #[schemars(range(min = 0.0, max = 60.0))]
     pub debounce_s: f64,
@@ -38,18 +38,17 @@ pub struct FaultRule {
     pub clear_s: Option<f64>,
     /// See `faults.latch`.
     pub latch: Option<bool>,
-    /// `fault`, or `warning` for what merely costs reserve.
-    pub severity: RuleSeverity,
+    /// `fault`, or `warning` for what merely costs reserve; `warning` of input and services.
+    pub severity: Option<RuleSeverity>,
 }
 
 /// How grave a fault is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RuleSeverity {
     /// The robot does its work with less reserve.
     Warning,
     /// The robot cannot be trusted to do its work.
-    #[default]
     Fault,
 }
 

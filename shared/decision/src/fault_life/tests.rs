@@ -33,6 +33,8 @@ struct Story {
     life: FaultLife,
     now_ns: u64,
     decided: CycleDecision,
+    observes: bool,
+    silent_services: u32,
 }
 
 impl Story {
@@ -44,6 +46,8 @@ impl Story {
                 kind: RecoveryKind::GoOn as u32,
                 ..CycleDecision::default()
             },
+            observes: true,
+            silent_services: 0,
         }
     }
 
@@ -60,6 +64,8 @@ impl Story {
                 now_ns: self.now_ns,
                 diagnosis: belief,
                 decided: self.decided,
+                observes: self.observes,
+                silent_services: self.silent_services,
             });
         }
     }
@@ -229,21 +235,26 @@ fn each_fault_of_a_set_has_a_life() {
     let mut story = Story::new(&shipped());
     story.report(FRONT, 1.0);
     let mut both = belief(MODE_MULTIPLE);
-    both.sets[0] = FaultSet {
+    both.set_count = 2;
+    both.sets[1] = FaultSet {
         leaves: 1 << FRONT | 1 << OTHER,
-        p: 0.8,
+        p: 0.4,
     };
     story.pass(Some(&both), 1.0);
+    assert_eq!(story.kept(), [(FRONT, Active, 1), (OTHER, Active, 1)]);
+    // The report is held, but the sets speak of none.
+    both.set_count = 1;
+    story.pass(Some(&both), 6.0);
     assert_eq!(story.kept(), [(FRONT, Active, 1), (OTHER, Active, 1)]);
     story.report(OTHER, 6.0);
     assert_eq!(story.kept(), [(FRONT, Latched, 1), (OTHER, Active, 1)]);
 }
 
 #[test]
-fn blindness_and_lost_stages_are_faults_of_their_own_and_no_fault_of_the_robot_is_over() {
+fn blindness_and_silent_services_are_faults_of_their_own_and_no_fault_of_the_robot_is_over() {
     let mut story = Story::new(&shipped());
     story.report(FRONT, 1.0);
-    story.decided.blind = 1;
+    (story.decided.blind, story.observes) = (1, false);
     story.decided.kind = RecoveryKind::Stop as u32;
     let blind = belief(MODE_BLIND);
     story.pass(Some(&blind), 20.0);
@@ -252,10 +263,10 @@ fn blindness_and_lost_stages_are_faults_of_their_own_and_no_fault_of_the_robot_i
     assert_eq!(story.kept(), [(FRONT, Active, 1), (3, Active, 1)]);
     assert_eq!(story.overall(), OverallState::Stale);
     story.decided = CycleDecision {
-        lost_stages: 1,
         kind: RecoveryKind::GoOn as u32,
         ..CycleDecision::default()
     };
+    (story.observes, story.silent_services) = (true, 1 << 2);
     story.report(0, 6.0);
     // The identifier is the third service.
     let expected = [(FRONT, Latched, 1), (3, Cleared, 1), (2, Active, 1)];
@@ -265,15 +276,56 @@ fn blindness_and_lost_stages_are_faults_of_their_own_and_no_fault_of_the_robot_i
 }
 
 #[test]
+fn nothing_is_over_and_nothing_lasts_while_nothing_is_seen_of_the_robot() {
+    let mut story = Story::new(&shipped());
+    story.report(FRONT, 1.0);
+    assert!(story.life.obey(LifeOrder::Acknowledge(0), story.now_ns));
+    let last_ns = story.block().records[0].last_ns;
+    // A filter that was started again says that all is well until it is armed.
+    story.observes = false;
+    story.report(0, 60.0);
+    story.report(OTHER, 60.0);
+    assert_eq!(story.kept(), [(FRONT, Acknowledged, 1)]);
+    assert_eq!(story.block().records[0].last_ns, last_ns);
+    story.observes = true;
+    story.report(0, 6.0);
+    assert_eq!(story.kept(), [(FRONT, Cleared, 1)]);
+}
+
+#[test]
+fn a_fault_that_comes_again_without_a_name_is_the_same_fault_once_it_has_one() {
+    let mut story = Story::new(&shipped());
+    story.report(FRONT, 1.0);
+    story.report(0, 6.0);
+    story.life.obey(LifeOrder::Acknowledge(0), story.now_ns);
+    let first_ns = story.block().records[0].first_ns;
+    story.report(UNKNOWN, 1.0);
+    assert_eq!(story.kept(), [(FRONT, Cleared, 1), (UNKNOWN, Active, 1)]);
+    let revision = story.life.revision();
+    story.report(FRONT, 0.01);
+    assert_ne!(story.life.revision(), revision, "a new name is news");
+    story.report(FRONT, 10.0);
+    assert_eq!(story.kept(), [(FRONT, Active, 2)]);
+    let block = story.block();
+    assert_eq!(block.kept().next().unwrap().first_ns, first_ns);
+}
+
+#[test]
 fn rules_by_name_hold_for_their_fault() {
     let mut settings = shipped();
     let rule = FaultRule {
         debounce_s: Some(2.0),
         latch: Some(false),
-        severity: RuleSeverity::Warning,
+        severity: Some(RuleSeverity::Warning),
         ..FaultRule::default()
     };
     settings.rules.insert("OTHER".into(), rule);
+    // What it does not name stays: nothing latches that is of the input, and it is a warning.
+    let input = FaultRule {
+        clear_s: Some(1.0),
+        ..FaultRule::default()
+    };
+    settings.rules.insert("INPUT".into(), input);
     let mut story = Story::new(&settings);
     story.report(OTHER, 1.9);
     assert_eq!(story.kept(), [(OTHER, Pending, 0)]);
@@ -281,6 +333,11 @@ fn rules_by_name_hold_for_their_fault() {
     assert_eq!(story.overall(), OverallState::Degraded);
     story.report(0, 6.0);
     assert_eq!(story.kept(), [(OTHER, Cleared, 1)]);
+    story.decided.blind = 1;
+    story.pass(None, 1.0);
+    story.decided.blind = 0;
+    story.pass(None, 1.1);
+    assert_eq!(story.kept(), [(OTHER, Cleared, 1), (1, Cleared, 1)]);
     settings.rules.insert("LEFT".into(), FaultRule::default());
     let error = FaultLife::new(&settings, &tree()).err().unwrap();
     let told = "faults.rules.LEFT: there is no such fault; there are SIDE, FRONT, REAR, OTHER, \
@@ -316,6 +373,15 @@ fn a_record_says_when_why_and_what_was_measured_at_the_onset() {
     assert_eq!((record.channel[0], record.command[1]), (1200.0, 0.5));
     assert_eq!((record.channel_valid, record.command_valid), (1, 2));
     assert_eq!((block.tree_hash, block.fault_count), (7, 1));
+    // Without any onset it is the newest frame; of a clock that was set back, none before.
+    let mut frame = SensorFrame::default();
+    frame.header.t_capture_ns = 500;
+    frame.set_channel(0, -1.0);
+    story.life.see(&frame);
+    story.report(OTHER, 1.0);
+    let block = story.block();
+    let other = block.kept().find(|it| it.what == OTHER).unwrap();
+    assert_eq!((other.frame_t_capture_ns, other.channel[0]), (500, -1.0));
 }
 
 #[test]
@@ -366,6 +432,8 @@ fn where_no_place_is_free_the_oldest_cleared_fault_gives_way_and_no_other() {
     full.report(FRONT, 1.0);
     assert_eq!(full.block().dropped_count, 1);
     assert_eq!(full.kept().len(), FAULTS);
+    full.report(0, 0.01);
+    assert_eq!(full.block().dropped_count, 0);
 }
 
 proptest! {
@@ -389,9 +457,16 @@ proptest! {
             }
             belief.sets[0].leaves = leaves;
             belief.p_unknown = p;
-            let [action, kind, blind, lost_stages] = words;
-            let decided = CycleDecision { action, kind, blind, lost_stages };
-            life.step(LifeInput { now_ns, diagnosis: Some(&belief), decided });
+            let [action, kind, blind, silent_services] = words;
+            let decided = CycleDecision { action, kind, blind: blind % 3 };
+            belief.set_count = action;
+            life.step(LifeInput {
+                now_ns,
+                diagnosis: Some(&belief),
+                decided,
+                observes: kind % 4 != 0,
+                silent_services,
+            });
             life.obey(LifeOrder::Acknowledge(u64::from(blind % 4)), now_ns);
             while life.take_change().is_some() {}
         }

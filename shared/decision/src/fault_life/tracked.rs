@@ -14,8 +14,8 @@ pub(super) struct Tracked {
     present_ns: u64,
     /// Time since it was present, ns.
     absent_ns: u64,
-    /// State and name that were told.
-    told: (u32, u32),
+    /// State that was told, and of which fault.
+    told: (u32, (u32, u32)),
 }
 
 impl Tracked {
@@ -40,17 +40,24 @@ impl Tracked {
         // What was written by another version, or half, is no fault.
         let is_known = record.state().is_some() && FaultSource::from_repr(record.source).is_some();
         match is_known && record.number != 0 {
-            true => Self {
-                record: *record,
-                told: (record.state, record.what),
-                ..Self::default()
-            },
+            true => {
+                let mut restored = Self {
+                    record: *record,
+                    ..Self::default()
+                };
+                restored.told();
+                restored
+            }
             false => Self::default(),
         }
     }
 
     pub(super) const fn is_kept(&self) -> bool {
         self.record.number != 0
+    }
+
+    pub(super) const fn is_of_robot(&self) -> bool {
+        self.record.source == FaultSource::Robot as u32
     }
 
     /// True while it is present, or was until a moment ago.
@@ -75,6 +82,14 @@ impl Tracked {
         self.record.what = what;
         (self.record.severity, self.record.latches) =
             (rule.severity as u32, u32::from(rule.latches));
+        // The onset of what has a name is known better.
+        self.record.frame_t_capture_ns = 0;
+    }
+
+    /// It is one with what was there, and over, before.
+    pub(super) fn goes_on(&mut self, earlier: &Self) {
+        self.record.first_ns = earlier.record.first_ns;
+        self.record.count = self.record.count.saturating_add(earlier.record.count);
     }
 
     /// Takes what is known of it.
@@ -94,6 +109,8 @@ impl Tracked {
             MODE_UNKNOWN => diagnosis.p_unknown,
             _ => diagnosis.p.get(node).copied().unwrap_or_default(),
         };
+        // Bad numbers are not for people.
+        record.p = Some(record.p).filter(|p| p.is_finite()).unwrap_or(0.0);
         let of = |values: &[f64]| values.get(node).copied().unwrap_or_default();
         (record.size, record.size_sd) = (of(&diagnosis.size), of(&diagnosis.size_sd));
         record.size_kind = diagnosis.size_kind.get(node).copied().unwrap_or_default();
@@ -160,8 +177,8 @@ impl Tracked {
         if state == FaultState::Active {
             record.count = record.count.saturating_add(1);
         }
-        if state == FaultState::Pending {
-            // It begins anew: its freeze frame is of this time.
+        if matches!(state, FaultState::Pending | FaultState::Active) {
+            // It begins anew, or its onset is known better by now.
             record.frame_t_capture_ns = 0;
         }
         self.present_ns = 0;
@@ -190,10 +207,10 @@ impl Tracked {
     /// True if its state or name is another than was told; what is pending is not told.
     pub(super) fn is_untold(&self) -> bool {
         let is_pending = self.record.state() == Some(FaultState::Pending);
-        self.is_kept() && !is_pending && self.told != (self.record.state, self.record.what)
+        self.is_kept() && !is_pending && self.told != (self.record.state, self.key())
     }
 
-    pub(super) const fn told(&mut self) {
-        self.told = (self.record.state, self.record.what);
+    pub(super) fn told(&mut self) {
+        self.told = (self.record.state, self.key());
     }
 }

@@ -19,7 +19,7 @@ pub struct Document {
     pub overall: &'static str,
     /// Those that are kept; the newest change first.
     pub faults: Vec<NamedFault>,
-    /// Faults that no place was free for.
+    /// What is present beside them, and has no place.
     pub dropped: u32,
     #[serde(skip)]
     revision: (u64, u64),
@@ -44,7 +44,7 @@ pub struct NamedFault {
     pub changed_ago_s: f64,
     pub p: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub size: Option<String>,
+    pub size: Option<FaultSize>,
     /// What speaks most for it, against what, by how many nat.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub evidence: Option<NamedEvidence>,
@@ -53,6 +53,22 @@ pub struct NamedFault {
     /// What was measured when it began.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub freeze_frame: Option<FreezeFrame>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FaultSize {
+    /// In which way it is broken.
+    pub way: &'static str,
+    /// In `unit`; both absent for a way that has no size.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sd: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<&'static str>,
+    /// All of it in words.
+    #[serde(skip)]
+    pub text: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -68,8 +84,8 @@ pub struct FreezeFrame {
     pub t_capture_ns: u64,
     /// The measured channels by name, in their units.
     pub channels: Vec<(String, f64)>,
-    /// The command, by place.
-    pub command: Vec<f64>,
+    /// The command, by place; null where it was not known.
+    pub command: Vec<Option<f64>>,
 }
 
 /// An instant of `CLOCK_MONOTONIC` on the clock of the wall.
@@ -121,8 +137,11 @@ impl Document {
         }
     }
 
-    /// True if there is a fault that somebody has to look after.
+    /// True if there is a fault that somebody has to look after, or nobody knows.
     pub fn needs_attention(&self) -> bool {
+        if self.overall == OverallState::Stale.name() {
+            return true;
+        }
         let open = [FaultState::Active, FaultState::Latched].map(FaultState::name);
         self.faults.iter().any(|it| open.contains(&it.state))
     }
@@ -167,10 +186,23 @@ impl NamedFault {
             first_ago_s: now.ago_s(record.first_ns),
             changed_ago_s: now.ago_s(record.changed_ns),
             p: record.p,
-            size: has_size.then(|| size_kind.text(record.size, record.size_sd)),
+            size: has_size.then(|| FaultSize::new(size_kind, record)),
             evidence,
             action: action.map_or_else(|| "?".to_owned(), Clone::clone),
             freeze_frame: FreezeFrame::new(record, setup),
+        }
+    }
+}
+
+impl FaultSize {
+    fn new(kind: SizeKind, record: &FaultRecord) -> Self {
+        let unit = kind.unit();
+        Self {
+            way: kind.word(),
+            value: unit.map(|_| record.size),
+            sd: unit.map(|_| record.size_sd),
+            unit,
+            text: kind.text(record.size, record.size_sd),
         }
     }
 }
@@ -180,12 +212,14 @@ impl FreezeFrame {
         let places = channels(&setup.robot).into_iter().enumerate();
         let measured = places.filter(|(at, _)| record.channel_valid >> at & 1 == 1);
         let channels = measured.map(|(at, channel)| (channel.name, record.channel[at]));
-        let known = record.command.iter().enumerate();
-        let known = known.filter(|(at, _)| record.command_valid >> at & 1 == 1);
+        let axes = u32::BITS - record.command_valid.leading_zeros();
+        let known = |at: usize| record.command_valid >> at & 1 == 1;
+        let command = record.command.iter().take(axes as usize).enumerate();
+        let command = command.map(|(at, value)| Some(*value).filter(|_| known(at)));
         (record.frame_t_capture_ns != 0).then(|| Self {
             t_capture_ns: record.frame_t_capture_ns,
             channels: channels.collect(),
-            command: known.map(|(_, value)| *value).collect(),
+            command: command.collect(),
         })
     }
 }

@@ -23,7 +23,7 @@ pub fn text(document: &Document) -> String {
     if document.dropped > 0 {
         let dropped = document.dropped;
         lines.push(format!(
-            "{dropped} further faults: `vigil clear` makes room"
+            "{dropped} more have no place: acknowledge what is over"
         ));
     }
     lines.join("\n")
@@ -49,7 +49,8 @@ fn why(fault: &NamedFault) -> String {
         let (channel, nat, against) = (&it.channel, it.nat, &it.against);
         format!("{channel} says so by {nat:.1} nat, against {against}")
     });
-    let parts = fault.size.clone().into_iter().chain(evidence);
+    let size = fault.size.as_ref().map(|size| size.text.clone());
+    let parts = size.into_iter().chain(evidence);
     parts.collect::<Vec<String>>().join("; ")
 }
 

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use vigil_blocks::{Block, Faults};
 use vigil_cycle::port::Link;
-use vigil_cycle::{Domain, Graph, Receiver, Topic};
+use vigil_cycle::{Clock, Domain, Graph, KeptBlock, Monotonic, Receiver, Topic};
 use vigil_setup::{GraphArgs, Setup};
 use vigil_terminal::CommandError;
 
@@ -35,7 +35,8 @@ impl View {
     /// A configuration that is refused; a graph that does not run.
     pub fn join(args: &GraphArgs) -> Result<Self, CommandError> {
         let setup = args.load().map_err(CommandError::usage)?;
-        let domain = running(&setup.file.graph.name)?;
+        demand_running(&setup.file.graph.name)?;
+        let domain = setup.domain().map_err(CommandError::failure)?;
         let link = Link::join(&domain, "vigil-faults").map_err(CommandError::failure)?;
         let graph = Graph::SharedMemory(link);
         let faults = graph.receiver(Topic::Faults);
@@ -47,32 +48,53 @@ impl View {
         })
     }
 
-    /// The first block, with names.
+    /// The first block, with names. Without a supervisor it is what the last one has kept, and
+    /// stale.
     ///
     /// # Errors
-    /// A graph that says nothing.
+    /// A graph of another fault tree; one that has said nothing yet.
     pub fn first(&mut self) -> Result<Document, CommandError> {
         let began = Instant::now();
         while began.elapsed() < FIRST {
-            if let Some(document) = self.newest() {
+            if let Some(document) = self.newest()? {
                 return Ok(document);
             }
             std::thread::sleep(POLL);
         }
-        let name = self.domain.graph();
-        let message = format!("graph '{name}': its supervisor says nothing of faults");
-        Err(CommandError::failure(message))
+        let kept = KeptBlock::<Faults>::read_file(&self.domain.faults_file());
+        let kept = kept.map(|block| self.named(&block)).transpose()?;
+        kept.map(|document| document.gone_stale()).ok_or_else(|| {
+            let name = self.domain.graph();
+            CommandError::failure(format!(
+                "graph '{name}': nothing has been said of faults yet"
+            ))
+        })
     }
 
-    /// The newest block that has come since the last look, with names.
-    pub fn newest(&mut self) -> Option<Document> {
+    /// The newest block that has come since the last look, with names; one that is too old is none.
+    ///
+    /// # Errors
+    /// A graph of another fault tree.
+    pub fn newest(&mut self) -> Result<Option<Document>, CommandError> {
         let mut newest = None;
         while let Some(block) = self.faults.take_next() {
-            if block.header.schema == Faults::SCHEMA {
-                newest = Some(Document::new(block, &self.setup));
+            let age_ns = Monotonic.now_ns().saturating_sub(block.header.t_publish_ns);
+            let is_fresh = Duration::from_nanos(age_ns) < STALE;
+            if block.header.schema == Faults::SCHEMA && is_fresh {
+                newest = Some(Box::new(*block));
             }
         }
-        newest
+        newest.map(|block| self.named(&block)).transpose()
+    }
+
+    fn named(&self, block: &Faults) -> Result<Document, CommandError> {
+        if block.tree_hash == self.setup.tree.hash() {
+            return Ok(Document::new(block, &self.setup));
+        }
+        let (name, file) = (self.domain.graph(), self.setup.path.display());
+        Err(CommandError::usage(format!(
+            "graph '{name}' has another fault tree than {file}: give its file with --config"
+        )))
     }
 
     /// True while the graph runs.
@@ -81,9 +103,9 @@ impl View {
     }
 }
 
-/// The place of a running graph.
-fn running(name: &str) -> Result<Domain, CommandError> {
-    Domain::running(name).ok_or_else(|| {
+/// Refuses the name of a graph that does not run.
+fn demand_running(name: &str) -> Result<(), CommandError> {
+    Domain::running(name).map(|_| ()).ok_or_else(|| {
         let others = Domain::all_running();
         let others = match others.is_empty() {
             true => "none runs".to_owned(),
