@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::error::Error;
 
-use vigil_blocks::{Readiness, SensorFrame};
+use vigil_blocks::{FaultSource, Readiness, SensorFrame};
 use vigil_decision::{FaultLife, LifeInput};
 use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Verdict;
@@ -22,7 +22,7 @@ pub(super) struct Watch<'a> {
     told: ToldFaults,
 }
 
-/// What an operator is told of faults.
+/// What an operator is told of the robot's faults.
 struct ToldFaults {
     life: FaultLife,
     /// By number, how often each became active.
@@ -39,7 +39,10 @@ impl ToldFaults {
             silent_services: 0,
         });
         while let Some(record) = self.life.take_change() {
-            self.activations.insert(record.number, record.count);
+            // That frames are missing is for other figures.
+            if record.source == FaultSource::Robot as u32 {
+                self.activations.insert(record.number, record.count);
+            }
         }
     }
 }

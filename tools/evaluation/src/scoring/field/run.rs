@@ -141,7 +141,7 @@ pub struct Run {
     pub contradiction_longest_s: f64,
     /// Time without valid input as it is reported, s.
     pub blind_s: f64,
-    /// Faults that an operator was told of.
+    /// Faults of the robot that an operator was told of.
     pub faults_told: usize,
     /// How often one of them became active.
     pub activations: usize,
