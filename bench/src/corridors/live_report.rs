@@ -5,12 +5,10 @@ use vigil_missions::simulation::{PairedDifference, Summary};
 
 use super::drive::CorridorMission;
 use super::live::LiveMission;
-use super::report::hits;
+use super::report::{hits, without_lead};
 use super::score::{MEASURES, POINTS, TOUCHES};
 use crate::archive::Archive;
 
-/// Largest probability of the lead over the ladder, were there none.
-const P_MAX: f64 = 1e-3;
 /// Points in which two drives of a mission may differ and be alike: a second and a half.
 const ALIKE: f64 = 1.5;
 
@@ -114,20 +112,8 @@ impl LiveComparison<'_> {
     /// The bars that are missed.
     #[must_use]
     pub fn shortfalls(&self) -> Vec<String> {
-        let found = self.against(1);
-        let leads = found.difference > 0.0 && found.p < P_MAX;
-        let text = || {
-            let (difference, half_width, p) = (found.difference, found.half_width, found.p);
-            format!(
-                "{difference:+.1} ± {half_width:.1} against the ladder, p {p:.1e}, \
-                 bar above 0 and p < .001"
-            )
-        };
         let touches: Vec<f64> = self.live.iter().map(|it| (TOUCHES.of)(&it.score)).collect();
-        (!leads)
-            .then(text)
-            .into_iter()
-            .chain(hits(&touches))
-            .collect()
+        let short = without_lead(&self.against(1)).into_iter();
+        short.chain(hits(&touches)).collect()
     }
 }

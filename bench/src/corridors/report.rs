@@ -200,17 +200,21 @@ pub fn shortfalls(arms: &[CorridorArm], missions: &[CorridorMission]) -> Vec<Str
     let is_ladder = |arm: &CorridorArm| matches!(arm, CorridorArm::Ladder(_));
     let ladder = arms.iter().position(is_ladder);
     let found = ladder.map(|ladder| table.against(None, ladder, POINTS));
-    let leads = |it: &PairedDifference| it.difference > 0.0 && it.p < P_MAX;
-    let short = found.filter(|it| !leads(it));
-    let text = |it: PairedDifference| {
-        let (difference, half_width, p) = (it.difference, it.half_width, it.p);
+    let short = found.and_then(|found| without_lead(&found));
+    let vigil = table.values(None, 0, TOUCHES.of);
+    short.into_iter().chain(hits(&vigil)).collect()
+}
+
+/// The bar on points: above the ladder, not by chance.
+pub(super) fn without_lead(found: &PairedDifference) -> Option<String> {
+    let (difference, half_width, p) = (found.difference, found.half_width, found.p);
+    let leads = difference > 0.0 && p < P_MAX;
+    (!leads).then(|| {
         format!(
             "{difference:+.1} ± {half_width:.1} against the ladder, p {p:.1e}, \
              bar above 0 and p < .001"
         )
-    };
-    let vigil = table.values(None, 0, TOUCHES.of);
-    short.map(text).into_iter().chain(hits(&vigil)).collect()
+    })
 }
 
 /// The bar on safety: no mission of Vigil's in which it runs into something.

@@ -27,7 +27,6 @@ pub struct FaultBoard {
     /// Where it is kept; nowhere in process.
     kept: Option<KeptBlock<Faults>>,
     /// Allocated once.
-    block: Box<Faults>,
     diagnosis: Box<FaultBelief>,
     is_diagnosed: bool,
     /// A diagnosis of this turn says something of the robot.
@@ -88,11 +87,9 @@ impl FaultBoard {
         graph: &Graph,
         kept: Option<KeptBlock<Faults>>,
     ) -> Result<Self, PortError> {
-        let mut block = Box::<Faults>::default();
         let left = kept.as_ref().and_then(KeptBlock::read);
         if let Some(left) = left.filter(|it| it.tree_hash == tree_hash) {
             life.restore(&left);
-            *block = *left;
         }
         use ServiceName::{Detector, Identifier, SensorSim, Supervisor};
         let peer = |service| PeerHealth::new(service, graph);
@@ -104,7 +101,6 @@ impl FaultBoard {
             peers: [peer(SensorSim)?, peer(Detector)?, peer(Identifier)?],
             faults: graph.sender(Topic::Faults)?,
             kept,
-            block,
             diagnosis: Box::default(),
             is_diagnosed: false,
             observes: false,
@@ -184,11 +180,11 @@ impl FaultBoard {
         if !is_changed && passed_ns.is_some_and(|passed_ns| passed_ns < INTERVAL_NS) {
             return Ok(());
         }
-        self.life.write(&mut self.block, self.tree_hash);
+        let block = self.faults.block();
+        self.life.write(block, self.tree_hash);
         if let Some(kept) = self.kept.as_mut().filter(|_| is_changed) {
-            kept.write(&self.block);
+            kept.write(block);
         }
-        *self.faults.block() = *self.block;
         let stamp = Stamp {
             t_schedule_ns: now_ns,
             t_capture_ns: now_ns,

@@ -179,7 +179,7 @@ impl FaultLife {
     /// A fault whose state is another than it was told last, once.
     pub fn take_change(&mut self) -> Option<&FaultRecord> {
         let changed = self.tracked.iter_mut().find(|it| it.is_untold())?;
-        changed.told();
+        changed.mark_told();
         Some(&changed.record)
     }
 

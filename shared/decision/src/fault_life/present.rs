@@ -6,9 +6,7 @@ use vigil_blocks::{
 use vigil_robot::FaultTree;
 
 use super::LifeInput;
-
-/// Services of a graph.
-const SERVICES: u32 = 4;
+use super::rules::SERVICES;
 
 /// Something that is present.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,7 +83,8 @@ impl PresentFaults {
         let of = |source, what| Present { source, what };
         let nodes = (1..FAULT_NODES as u32).filter(|node| self.nodes >> node & 1 == 1);
         let unknown = self.unknown.then_some(MODE_UNKNOWN);
-        let silent = (0..SERVICES).filter(|service| self.silent_services >> service & 1 == 1);
+        let silent =
+            (0..SERVICES.len() as u32).filter(|service| self.silent_services >> service & 1 == 1);
         let blind = (self.blind != 0).then_some(self.blind);
         nodes
             .chain(unknown)

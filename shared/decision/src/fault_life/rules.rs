@@ -6,7 +6,7 @@ use vigil_robot::FaultTree;
 use super::settings::{FaultLifeSettings, FaultRule};
 
 /// Services, in the order of the data, as rules name them.
-const SERVICES: [&str; 4] = ["sensor-sim", "detector", "identifier", "supervisor"];
+pub(super) const SERVICES: [&str; 4] = ["sensor-sim", "detector", "identifier", "supervisor"];
 
 /// A rule about a fault that does not exist.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -39,7 +39,6 @@ impl FaultRules {
         settings: &FaultLifeSettings,
         tree: &FaultTree,
     ) -> Result<Self, FaultRuleError> {
-        let ns = |s: f64| (s * 1e9) as u64;
         let plain = Rule {
             debounce_ns: ns(settings.debounce_s),
             clear_ns: ns(settings.clear_s),
@@ -89,7 +88,6 @@ impl FaultRules {
 impl Rule {
     /// The same but for what `own` says.
     fn changed(self, own: &FaultRule) -> Self {
-        let ns = |s: f64| (s * 1e9) as u64;
         Self {
             debounce_ns: own.debounce_s.map_or(self.debounce_ns, ns),
             clear_ns: own.clear_s.map_or(self.clear_ns, ns),
@@ -97,6 +95,11 @@ impl Rule {
             severity: own.severity.map_or(self.severity, Severity::from),
         }
     }
+}
+
+/// Seconds in ns.
+fn ns(seconds: f64) -> u64 {
+    (seconds * 1e9) as u64
 }
 
 fn unknown(name: &str, tree: &FaultTree) -> FaultRuleError {

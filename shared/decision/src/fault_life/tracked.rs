@@ -45,7 +45,7 @@ impl Tracked {
                     record: *record,
                     ..Self::default()
                 };
-                restored.told();
+                restored.mark_told();
                 restored
             }
             false => Self::default(),
@@ -210,7 +210,8 @@ impl Tracked {
         self.is_kept() && !is_pending && self.told != (self.record.state, self.key())
     }
 
-    pub(super) fn told(&mut self) {
+    /// Its state and name are told from now on.
+    pub(super) fn mark_told(&mut self) {
         self.told = (self.record.state, self.key());
     }
 }

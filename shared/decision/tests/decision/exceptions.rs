@@ -274,20 +274,22 @@ R: FP : EMPTY : * : * -5
 R: DOCK : * : * : * -1
 ";
 
+/// What such a robot declares.
+const DECLARED: &str = "
+    evidence = 'symptoms'
+    epoch_ms = 5000.0
+    [symptoms]
+    BATTERY = { bit = 8, counts = 'standing' }
+    DOCKED = { bit = 31, counts = 'outcome' }
+    [actions]
+    FP = { kind = 'go_on' }
+    DOCK = { kind = 'own' }
+";
+
 #[test]
 fn a_symptom_an_outcome_and_an_action_of_ones_own_need_no_code() {
     let (battery, docked) = (1 << 8, 1 << 31);
-    let declared = "
-        evidence = 'symptoms'
-        epoch_ms = 5000.0
-        [symptoms]
-        BATTERY = { bit = 8, counts = 'standing' }
-        DOCKED = { bit = 31, counts = 'outcome' }
-        [actions]
-        FP = { kind = 'go_on' }
-        DOCK = { kind = 'own' }
-    ";
-    let mut robot = Navigation::with(DOCKING, &toml::from_str(declared).unwrap());
+    let mut robot = Navigation::with(DOCKING, &toml::from_str(DECLARED).unwrap());
     robot.rest(6.0, Symptoms::EPM);
     assert_eq!(
         robot.kind(),
@@ -316,17 +318,7 @@ fn an_action_of_ones_own_that_failed_is_the_step_that_the_model_knows_of() {
             "O: DOCK\n0.05 0 0.95 0\n0.05 0 0.95 0",
             "O: DOCK\n0.05 0 0.95 0\n0.9 0.1 0 0",
         );
-    let declared = "
-        evidence = 'symptoms'
-        epoch_ms = 5000.0
-        [symptoms]
-        BATTERY = { bit = 8, counts = 'standing' }
-        DOCKED = { bit = 31, counts = 'outcome' }
-        [actions]
-        FP = { kind = 'go_on' }
-        DOCK = { kind = 'own' }
-    ";
-    let mut robot = Navigation::with(&model, &toml::from_str(declared).unwrap());
+    let mut robot = Navigation::with(&model, &toml::from_str(DECLARED).unwrap());
     robot.cycle(1 << 8);
     assert_eq!(robot.kind(), RecoveryKind::Own);
     let empty = robot.p("EMPTY");
