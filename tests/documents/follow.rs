@@ -199,7 +199,10 @@ fn arguments(program: &str, words: Vec<&str>, graph: &str, is_awaited: bool) -> 
     let mut words: Vec<String> = words.into_iter().map(str::to_owned).collect();
     let speaks_to_a_graph = match program {
         "scripts/up" => true,
-        "target/release/vigil" => ["check", "inject"].contains(&words[0].as_str()),
+        "target/release/vigil" => {
+            ["check", "inject"].contains(&words[0].as_str())
+                && !words.contains(&"--list".to_owned())
+        }
         _ => false,
     };
     if program == "scripts/up" && !is_awaited {

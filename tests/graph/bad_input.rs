@@ -239,9 +239,10 @@ fn help_and_misspelt_options_need_no_build() {
     let mut launcher = binary("vigil-launcher");
     let launcher = launcher.arg("--help").env_remove("VIGIL_CONFIG");
     let launcher = launcher.output().unwrap();
-    assert_eq!(
-        String::from_utf8_lossy(&help.stdout),
-        String::from_utf8_lossy(&launcher.stdout),
+    let help = String::from_utf8_lossy(&help.stdout);
+    let launcher = String::from_utf8_lossy(&launcher.stdout);
+    assert!(
+        help.ends_with(launcher.as_ref()),
         "write it anew: target/debug/vigil-launcher --help > scripts/up.help"
     );
     for wrong in ["--duratoin", "--durat", "--sources=external"] {

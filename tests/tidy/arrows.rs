@@ -52,6 +52,7 @@ fn dependencies(table: &Table) -> Vec<String> {
 }
 
 const SHARED: &[&str] = &[
+    "vigil-timeline",
     "vigil-setup",
     "vigil-cycle",
     "vigil-recording",
@@ -84,7 +85,8 @@ const TOOLS: &[&str] = &[
 ];
 
 /// The tools that the door may link: it starts the others.
-const OF_THE_DOOR: &[&str] = &["vigil-terminal"];
+/// The launcher is for its options.
+const OF_THE_DOOR: &[&str] = &["vigil-terminal", "vigil-launcher"];
 
 /// For each shared crate, the crates of the workspace that it may see.
 const ALLOWED: &[(&str, &[&str])] = &[
@@ -114,6 +116,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vigil-inference",
             "vigil-blocks",
         ],
+    ),
+    (
+        "vigil-timeline",
+        &["vigil-setup", "vigil-cycle", "vigil-robot", "vigil-blocks"],
     ),
     (
         "vigil-recording",

@@ -1,9 +1,7 @@
 //! The service processes: start, restart, stop.
 
 use std::io;
-use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use vigil_cycle::failure::Failure;
@@ -11,20 +9,22 @@ use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Domain, Monotonic, RunReport, signal};
 
 use crate::error::LauncherError;
+use crate::locks::Locks;
 use crate::observer::HealthObserver;
-use crate::plan::{CommandLine, Plan};
+use crate::plan::Plan;
+use crate::process::Process;
 use crate::restarts::{Death, RestartHistory};
 
 /// Time that a service may take to stop before it is killed: three cycles at the lowest rate,
 /// 1 Hz, as a service ends between two cycles.
 const STOP_LIMIT: Duration = Duration::from_secs(3);
-/// Interval at which a stopping service is looked at: nothing waits for it but the end.
-const POLL: Duration = Duration::from_millis(5);
+/// Time that a killed one may take to be gone.
+const KILL_LIMIT: Duration = Duration::from_secs(1);
 
 /// One service process.
 struct ServiceProcess {
     name: ServiceName,
-    child: Child,
+    process: Process,
     report: PathBuf,
     /// Where it leaves the assertion that ended it.
     failure: PathBuf,
@@ -35,72 +35,109 @@ struct ServiceProcess {
 /// All service processes of a graph.
 pub struct Children {
     services: Vec<ServiceProcess>,
+    locks: Locks,
     restarted: Vec<ServiceName>,
     gave_up: Option<String>,
 }
 
 impl Children {
     /// Starts every service of the plan; on a failure stops those already started.
-    pub fn start(plan: &Plan, domain: &Domain) -> Result<Self, LauncherError> {
-        let mut children = Self {
-            services: Vec::new(),
-            restarted: Vec::new(),
-            gave_up: None,
-        };
+    pub fn start(plan: &Plan, domain: &Domain, locks: Locks) -> Result<Self, LauncherError> {
+        let mut children = Self::none(locks);
         for name in plan.services() {
-            let report = domain.folder().join(format!("{}.report", name.as_str()));
-            let failure = domain.failure_file(name);
+            let (report, failure) = (report_file(domain, name), domain.failure_file(name));
             for old in [&report, &failure] {
                 let _ = std::fs::remove_file(old);
             }
             // Those already started stop when `children` is dropped.
-            let child = spawn(plan.command(name, &report))?;
-            children.services.push(ServiceProcess {
-                name,
-                child,
-                report,
-                failure,
-                history: RestartHistory::new(plan.restart_policy()),
-                restart_at: None,
-            });
+            let process = Process::start(plan.command(name, &report))?;
+            children.add(plan, domain, (name, process));
         }
         let list = domain.processes_file();
         children
-            .list(plan, domain)
+            .announce(plan, domain)
             .map_err(|cause| LauncherError::file(list, cause))?;
         Ok(children)
     }
 
-    /// Leaves the process ids where whoever finds the graph running can read them.
-    fn list(&self, plan: &Plan, domain: &Domain) -> io::Result<()> {
-        let line = |s: &ServiceProcess| format!("{} {}\n", s.name.as_str(), s.child.id());
-        let text: String = self.services.iter().map(line).collect();
+    /// Takes over the services of a launcher that is gone; those that are gone, too, are restarted.
+    pub fn adopt(plan: &Plan, domain: &Domain, locks: Locks) -> Result<Self, LauncherError> {
+        let (mut children, listed) = (Self::none(locks), domain.processes().services);
+        for name in plan.services() {
+            let found = listed.iter().find(|(of, _)| *of == name);
+            let found = found.and_then(|(_, pid)| domain.find_process(*pid));
+            let process = match found {
+                Some(process) => Process::found(process),
+                None => Process::start(plan.command(name, &report_file(domain, name)))?,
+            };
+            children.add(plan, domain, (name, process));
+        }
+        let list = domain.launcher_file();
+        let listed = children.list();
+        listed.map_err(|cause| LauncherError::file(list, cause))?;
+        Ok(children)
+    }
+
+    const fn none(locks: Locks) -> Self {
+        Self {
+            services: Vec::new(),
+            locks,
+            restarted: Vec::new(),
+            gave_up: None,
+        }
+    }
+
+    fn add(&mut self, plan: &Plan, domain: &Domain, (name, process): (ServiceName, Process)) {
+        self.services.push(ServiceProcess {
+            name,
+            process,
+            report: report_file(domain, name),
+            failure: domain.failure_file(name),
+            history: RestartHistory::new(plan.restart_policy()),
+            restart_at: None,
+        });
+    }
+
+    /// Leaves what the graph runs on, and its processes, where whoever finds it running reads them.
+    fn announce(&mut self, plan: &Plan, domain: &Domain) -> io::Result<()> {
+        self.list()?;
+        std::fs::write(domain.document_file(), plan.document_text())?;
         // First: a publisher that finds the graph may ask for them.
         plan.setup.border().tell_publishers(domain)?;
+        let line = |s: &ServiceProcess| format!("{} {}\n", s.name.as_str(), s.process.id());
+        let text: String = self.services.iter().map(line).collect();
         std::fs::write(domain.processes_file(), text)
+    }
+
+    /// Lists the present processes.
+    fn list(&mut self) -> io::Result<()> {
+        let present = self.services.iter().map(|s| (s.name, s.process.id()));
+        let present: Vec<_> = present.collect();
+        self.locks.launcher.list(&present)
     }
 
     /// Restarts what has died; true if a service had to be given up.
     pub fn look_after(&mut self, plan: &Plan, observer: &mut HealthObserver) -> bool {
+        let mut is_listed = true;
         for service in &mut self.services {
             let now = Instant::now();
             let name = service.name.as_str();
-            if let (None, Ok(Some(status))) = (service.restart_at, service.child.try_wait()) {
+            if let (None, Some(ending)) = (service.restart_at, service.process.ended()) {
                 let failure = service.take_failure(observer);
                 let death = Death {
-                    code: status.code(),
+                    code: ending.code(),
                     failure,
                     can_resume: plan.can_resume(service.name),
                 };
                 match service.history.judge(&death, now) {
                     Ok(delay) => {
-                        tell!("vigil: {name} ended ({status}); restarting");
+                        tell!("vigil: {name} ended ({ending}); restarting");
                         service.restart_at = Some(now + delay);
                         observer.remove_dead_peers();
                     }
                     Err(reason) => {
-                        tell!("vigil: {name} ended ({status}); given up: {reason}");
-                        self.gave_up = Some(format!("{name}: {status}; {reason}"));
+                        tell!("vigil: {name} ended ({ending}); given up: {reason}");
+                        self.gave_up = Some(format!("{name}: {ending}; {reason}"));
                         return true;
                     }
                 }
@@ -109,10 +146,14 @@ impl Children {
             if service.restart_at.is_some_and(|at| now >= at) && !signal::stop_requested() {
                 service.restart_at = None;
                 service.history.restarted(now);
+                // The one that has ended may have been the last of another launcher's.
+                self.locks.graph.take_over();
                 let (began_ns, drive) = (Monotonic.now_ns(), observer.drive());
-                match spawn(plan.command_again(service.name, &service.report, drive.as_ref())) {
-                    Ok(child) => {
-                        service.child = child;
+                let command = plan.command_again(service.name, &service.report, drive.as_ref());
+                match Process::start(command) {
+                    Ok(process) => {
+                        service.process = process;
+                        is_listed = false;
                         observer.timeline.add_restart(service.name, began_ns);
                         self.restarted.push(service.name);
                     }
@@ -123,6 +164,10 @@ impl Children {
                     }
                 }
             }
+        }
+        if !is_listed {
+            // What cannot be listed runs all the same.
+            let _ = self.list();
         }
         false
     }
@@ -144,7 +189,7 @@ impl Children {
         let found = self.services.iter_mut().find(|s| s.name == name);
         if let Some(service) = found.filter(|s| s.restart_at.is_none()) {
             tell!("vigil: {} {why}: killed", name.as_str());
-            let _ = service.child.kill();
+            service.process.kill();
         }
     }
 
@@ -152,18 +197,14 @@ impl Children {
     /// kills those that do not stop in time.
     pub fn stop(&mut self) {
         for service in self.services.iter_mut().rev() {
-            if matches!(service.child.try_wait(), Ok(None)) {
-                signal::terminate(service.child.id());
+            if service.process.ended().is_none() {
+                service.process.terminate();
             }
-            let deadline = Instant::now() + STOP_LIMIT;
-            while matches!(service.child.try_wait(), Ok(None)) && Instant::now() < deadline {
-                std::thread::sleep(POLL);
-            }
-            if matches!(service.child.try_wait(), Ok(None)) {
+            if !service.process.wait(STOP_LIMIT) {
                 tell!("vigil: {} did not stop: killed", service.name.as_str());
-                let _ = service.child.kill();
+                service.process.kill();
+                service.process.wait(KILL_LIMIT);
             }
-            let _ = service.child.wait();
         }
     }
 
@@ -209,15 +250,9 @@ impl Drop for Children {
     }
 }
 
-fn spawn(command: CommandLine) -> Result<Child, LauncherError> {
-    // A group of its own: Ctrl-C reaches the launcher alone, which stops the services in order.
-    Command::new(&command.program)
-        .args(command.options)
-        .process_group(0)
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .spawn()
-        .map_err(|cause| LauncherError::file(command.program, cause))
+/// Where a service leaves its report.
+fn report_file(domain: &Domain, name: ServiceName) -> PathBuf {
+    domain.folder().join(format!("{}.report", name.as_str()))
 }
 
 #[cfg(test)]

@@ -5,14 +5,11 @@ use std::path::PathBuf;
 
 use vigil_cycle::PortError;
 use vigil_recording::frames::FramesError;
-use vigil_setup::SetupError;
+use vigil_setup::{NotRunning, SetupError};
 
 /// What the launcher cannot do.
 #[derive(Debug, thiserror::Error)]
 pub enum LauncherError {
-    /// `--duration` is no time.
-    #[error("--duration: allowed is any number of seconds above 0")]
-    Duration,
     /// `--inject` with another source than the simulator.
     #[error("--inject: only the simulator can be broken; the source is another")]
     NotSimulated,
@@ -50,6 +47,9 @@ pub enum LauncherError {
     /// A core cannot be kept awake.
     #[error("--keep-awake: {0}")]
     KeepAwake(io::Error),
+    /// There is no such graph to adopt.
+    #[error(transparent)]
+    NotRunning(#[from] NotRunning),
     /// The transport failed.
     #[error(transparent)]
     Port(#[from] PortError),

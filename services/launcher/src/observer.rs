@@ -1,5 +1,6 @@
 //! Reads the Health of every service.
 
+use std::path::Path;
 use std::time::Duration;
 
 use serde::Serialize;
@@ -8,8 +9,9 @@ use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Graph, Monotonic, PortError, Receiver, Topic, health};
 
+use vigil_timeline::{EventReader, Timeline};
+
 use crate::plan::{DriveProgress, Plan};
-use crate::timeline::Timeline;
 
 /// What the launcher knows of one service.
 pub struct ServiceView {
@@ -99,8 +101,8 @@ impl HealthObserver {
         })
     }
 
-    /// Takes what is new; prints events to standard error as they come if `show`.
-    pub fn poll(&mut self, show: bool) {
+    /// Takes what is new.
+    pub fn poll(&mut self) {
         for service in &mut self.watched {
             for _ in 0..service.receiver.buffer() {
                 let Some(block) = service.receiver.take_next() else {
@@ -119,7 +121,7 @@ impl HealthObserver {
                 let overwritten = health::new_events(block, &mut service.next_event, |event| {
                     timeline.add(service.name, event);
                 });
-                timeline.add_overwritten(overwritten);
+                timeline.add_overwritten(service.name, overwritten);
                 // An external sensor does not say when the drive begins: the first action does.
                 if self.is_external && service.name == ServiceName::Supervisor && block.cycles > 0 {
                     self.timeline.begin(block.accounted_ns[0]);
@@ -127,7 +129,14 @@ impl HealthObserver {
                 service.latest = Some(Box::new(*block));
             }
         }
-        self.timeline.settle(show);
+    }
+
+    /// What an earlier launcher has told is not told again: it stands in the file at `path`.
+    pub fn skip_told(&mut self, path: &Path) {
+        let mut told = EventReader::open(path);
+        while let Ok(Some(entry)) = told.next_entry() {
+            self.timeline.skip_told(&entry);
+        }
     }
 
     /// What a simulator that replaces another has to know; `None` before the drive has begun.
@@ -223,7 +232,7 @@ mod tests {
             };
             sender.send(Stamp::default(), &Monotonic).unwrap();
             // What a writer that is gone has sent cannot be read any more.
-            observer.poll(false);
+            observer.poll();
         };
         report(5, 7);
         report(3, 9);

@@ -10,44 +10,11 @@ use vigil_cycle::{KeepAwake, SealedText};
 use vigil_recording::frames;
 use vigil_robot::Injection;
 use vigil_setup::graph_file::Source;
-use vigil_setup::{GraphArgs, Setup};
+use vigil_setup::{Document, RunningGraph, Setup};
 
+use crate::args::LauncherArgs;
 use crate::error::LauncherError;
 use crate::restarts::RestartPolicy;
-
-/// Starts a Vigil graph, watches it and prints what happened.
-#[derive(Debug, Clone, clap::Parser)]
-#[command(name = "scripts/up", bin_name = "scripts/up", version)]
-pub struct LauncherArgs {
-    #[command(flatten)]
-    pub graph: GraphArgs,
-    /// Stop after this many seconds. They count from the first cycle in which every service
-    /// answers.
-    #[arg(long, value_name = "S")]
-    pub duration: Option<f64>,
-    /// Break the simulated rover T seconds after the start: `stuck:RM@5`, `encoder:LF:zero@3`.
-    /// `clear:RM@9` and `clear:all@9` mend it. Further kinds are disturbances, such as
-    /// `tether:20@5` and `steer-jump:LF:0.2@5`. An unknown kind prints the list of all.
-    #[arg(long, value_name = "SPEC@T")]
-    pub inject: Vec<String>,
-    /// Keep the graph's cores from halting, with a thread of the lowest class on each. A halted
-    /// core takes long to wake; an awake one costs power.
-    #[arg(long)]
-    pub keep_awake: bool,
-    /// Write the times of every cycle to `DIR/SERVICE.stamps`. A record is four little-endian
-    /// 64-bit numbers, ns of CLOCK_MONOTONIC: due, input published, awake, output published.
-    #[arg(long, value_name = "DIR")]
-    pub stamps: Option<PathBuf>,
-    /// Cycles whose times are kept; the oldest are dropped.
-    #[arg(long, value_name = "N", default_value_t = 100_000, requires = "stamps")]
-    pub stamped_cycles: usize,
-    /// Record no latencies; the summary then has none. It serves to measure what recording costs.
-    #[arg(long)]
-    pub no_timing: bool,
-    /// Print one JSON document at the end, and nothing else on standard output.
-    #[arg(long)]
-    pub json: bool,
-}
 
 /// Changes younger than this may not be in the timeline when a simulator dies, s: four intervals of
 /// Health, which goes out twenty times a second.
@@ -86,6 +53,7 @@ pub struct Plan {
     pub setup: Setup,
     /// What every service reads: the same bytes at each restart, even if a file was edited.
     document: SealedText,
+    text: String,
     /// Folder of the services' programs: the launcher's own.
     pub programs: PathBuf,
     inject: Vec<String>,
@@ -106,9 +74,6 @@ impl Plan {
 
     /// Reads the configuration and checks the options against it.
     fn read(args: &LauncherArgs) -> Result<Self, LauncherError> {
-        if args.duration.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
-            return Err(LauncherError::Duration);
-        }
         let mut document = args.graph.read()?;
         let mut setup = document.check()?;
         if !args.inject.is_empty() && setup.file.sensor.source != Source::Simulator {
@@ -126,15 +91,36 @@ impl Plan {
             cycles: args.stamped_cycles,
         };
         Ok(Self {
-            document: SealedText::new(&document.to_text()?).map_err(LauncherError::Document)?,
+            inject: args.inject.clone(),
+            stamps: args.stamps.as_ref().map(stamps),
+            no_timing: args.no_timing,
+            ..Self::of(&document, setup)?
+        })
+    }
+
+    /// What a running graph runs on, to look after it from now on.
+    pub fn of_running(graph: &RunningGraph) -> Result<Self, LauncherError> {
+        Self::of(&graph.document, graph.setup.clone())
+    }
+
+    fn of(document: &Document, setup: Setup) -> Result<Self, LauncherError> {
+        let text = document.to_text()?;
+        Ok(Self {
+            document: SealedText::new(&text).map_err(LauncherError::Document)?,
+            text,
             setup,
             programs: std::env::current_exe()
                 .unwrap_or_default()
                 .with_file_name(""),
-            inject: args.inject.clone(),
-            stamps: args.stamps.as_ref().map(stamps),
-            no_timing: args.no_timing,
+            inject: Vec::new(),
+            stamps: None,
+            no_timing: false,
         })
+    }
+
+    /// What every service reads.
+    pub fn document_text(&self) -> &str {
+        &self.text
     }
 
     /// Lets each service check what it needs, models included, without starting it.
@@ -309,7 +295,7 @@ pub(crate) mod tests {
     pub(crate) fn plan(options: &[&str]) -> Result<Plan, LauncherError> {
         let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
         let config = format!("{root}/config/rover.toml");
-        let line = ["scripts/up", "--config", &config];
+        let line = ["vigil run", "--config", &config];
         Plan::read(&LauncherArgs::parse_from(line.iter().chain(options)))
     }
 
@@ -396,7 +382,6 @@ pub(crate) mod tests {
     #[test]
     fn options_that_do_not_fit_are_refused_with_what_is_allowed() {
         let refusal = |options: &[&str]| plan(options).err().unwrap().to_string();
-        assert!(refusal(&["--duration", "0"]).contains("above 0"));
         let external = ["--source", "external", "--inject", "stuck:RM@5"];
         assert!(refusal(&external).contains("only the simulator"));
         let recording = concat!(

@@ -9,9 +9,9 @@ use vigil_cycle::latency::Percentiles;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Placement, RunReport};
 use vigil_setup::Setup;
+use vigil_timeline::{Timeline, TimelineEntry, told};
 
 use crate::observer::Counters;
-use crate::timeline::{Timeline, TimelineEntry};
 
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -256,7 +256,7 @@ impl fmt::Display for Summary {
         }
         self.unseen(f)?;
         writeln!(f, "  timeline:")?;
-        for event in self.events.iter().filter(|event| event.is_told()) {
+        for event in told(&self.events) {
             writeln!(f, "  {event}")?;
         }
         if let Some(gave_up) = &self.gave_up {

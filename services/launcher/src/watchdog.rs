@@ -5,10 +5,10 @@ use vigil_blocks::{Event, EventKind};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::watchdog::Settings;
 use vigil_cycle::{Clock, Monotonic, Watchdog};
+use vigil_timeline::watchdog_text;
 
 use crate::children::Children;
 use crate::observer::HealthObserver;
-use crate::words;
 
 /// Feeds the watchdog with what the services report, and acts on what it finds.
 pub struct WatchdogDriver {
@@ -53,7 +53,7 @@ impl WatchdogDriver {
                 },
             );
             if finding.needs_restart() {
-                children.end(name, words::watchdog(finding));
+                children.end(name, watchdog_text(finding));
             }
         }
     }

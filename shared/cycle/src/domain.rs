@@ -81,6 +81,12 @@ impl GraphLock {
             libc::fcntl(self.file.as_raw_fd(), libc::F_SETFD, 0);
         }
     }
+
+    /// Holds the lock from now on, if no process holds it that was started by another launcher.
+    /// Children that share this lock then hold it as well.
+    pub fn take_over(&self) {
+        let _ = self.file.try_lock();
+    }
 }
 
 impl Domain {
@@ -128,7 +134,7 @@ impl Domain {
 
     /// True while a launcher or one of its services lives. What was killed has left its files.
     fn is_locked(&self) -> bool {
-        let file = File::open(self.folder.join("lock"));
+        let file = File::open(self.lock_file());
         file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(fs::TryLockError::WouldBlock)))
     }
 
@@ -154,6 +160,19 @@ impl Domain {
     #[must_use]
     pub fn processes_file(&self) -> PathBuf {
         self.folder.join("processes")
+    }
+
+    /// File with what the graph runs on: configuration and models, options applied. Who watches a
+    /// graph takes names from it.
+    #[must_use]
+    pub fn document_file(&self) -> PathBuf {
+        self.folder.join("document")
+    }
+
+    /// File to which the launcher writes what happens.
+    #[must_use]
+    pub fn events_file(&self) -> PathBuf {
+        self.folder.join("events")
     }
 
     /// File in which the supervisor keeps the faults, for one that replaces it.
@@ -267,20 +286,23 @@ impl Domain {
     /// # Errors
     /// The file system's.
     pub fn lock(&self) -> io::Result<Option<GraphLock>> {
-        let file = OpenOptions::new()
-            .create(true)
-            .truncate(false)
-            .write(true)
-            .mode(0o600)
-            .open(self.folder.join("lock"))?;
-        for _ in 0..LOCK_ATTEMPTS {
-            match file.try_lock() {
-                Ok(()) => return Ok(Some(GraphLock { file })),
-                Err(fs::TryLockError::WouldBlock) => std::thread::sleep(LOCK_PAUSE),
-                Err(fs::TryLockError::Error(error)) => return Err(error),
-            }
-        }
-        Ok(None)
+        let file = open_to_lock(&self.lock_file())?;
+        Ok(lock_soon(&file)?.then_some(GraphLock { file }))
+    }
+
+    /// The lock of a graph whose services hold it, for a launcher that adopts them: see
+    /// [`GraphLock::take_over`].
+    ///
+    /// # Errors
+    /// The file system's.
+    pub fn adopt_lock(&self) -> io::Result<GraphLock> {
+        let file = open_to_lock(&self.lock_file())?;
+        Ok(GraphLock { file })
+    }
+
+    /// File of [`GraphLock`].
+    pub(crate) fn lock_file(&self) -> PathBuf {
+        self.folder.join("lock")
     }
 
     /// Files of this graph in /dev/shm and in the transport's folder.
@@ -310,6 +332,7 @@ impl Domain {
             self.addresses_file(),
             self.start_file(),
             self.faults_file(),
+            self.document_file(),
         ] {
             let _ = fs::remove_file(file);
         }
@@ -358,6 +381,25 @@ fn collect_files(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
+/// Opens a file that is only there to be locked.
+pub(crate) fn open_to_lock(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.create(true).truncate(false).write(true).mode(0o600);
+    options.open(path)
+}
+
+/// Locks a file; false if it is held for longer than a look at it takes.
+pub(crate) fn lock_soon(file: &File) -> io::Result<bool> {
+    for _ in 0..LOCK_ATTEMPTS {
+        match file.try_lock() {
+            Ok(()) => return Ok(true),
+            Err(fs::TryLockError::WouldBlock) => std::thread::sleep(LOCK_PAUSE),
+            Err(fs::TryLockError::Error(error)) => return Err(error),
+        }
+    }
+    Ok(false)
+}
+
 /// `/run/vigil` where the user may write there, else the user's own runtime folder. Short, since
 /// socket paths are limited to 108 bytes.
 fn runtime_folder() -> PathBuf {
@@ -401,6 +443,9 @@ mod tests {
             domain.channels_file(),
             domain.addresses_file(),
             domain.start_file(),
+            domain.document_file(),
+            domain.events_file(),
+            domain.launcher_file(),
             domain.failure_file(ServiceName::Detector),
         ];
         for (i, file) in files.iter().enumerate() {

@@ -31,10 +31,19 @@ pub fn stop_requested() -> bool {
 
 /// Asks a process to stop (SIGTERM).
 pub fn terminate(pid: u32) {
-    // SAFETY: a plain system call; the caller names a process that it has not reaped yet, so the
-    // number cannot belong to anybody else.
+    send(pid, libc::SIGTERM);
+}
+
+/// Ends a process (SIGKILL).
+pub fn kill(pid: u32) {
+    send(pid, libc::SIGKILL);
+}
+
+fn send(pid: u32, signal: libc::c_int) {
+    // SAFETY: a plain system call; the caller names a process that it has not reaped yet, or has
+    // just seen alive under its own name.
     #[allow(unsafe_code)]
     unsafe {
-        libc::kill(pid.cast_signed(), libc::SIGTERM);
+        libc::kill(pid.cast_signed(), signal);
     }
 }

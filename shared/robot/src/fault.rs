@@ -3,7 +3,6 @@
 use std::fmt;
 
 use crate::description::Description;
-use crate::disturbance_kind::{DisturbanceSpec, KINDS};
 
 /// Kind of a wheel fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -46,16 +45,8 @@ pub struct Fault {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FaultError {
     /// The form is wrong.
-    #[error(
-        "'{found}' is not a fault: expected stuck:WHEEL, encoder:WHEEL:zero|frozen|noise, \
-         clear:WHEEL|KIND[:PLACE]|all, or a disturbance: {disturbances}"
-    )]
-    Form {
-        /// What was given.
-        found: String,
-        /// Forms of all disturbances.
-        disturbances: String,
-    },
+    #[error("'{0}' is not a fault; `vigil inject --list` lists what can be injected")]
+    Form(String),
     /// The form of a disturbance is wrong.
     #[error("'{found}' does not have the form {form}")]
     Disturbance {
@@ -106,11 +97,7 @@ pub enum FaultError {
 impl FaultError {
     /// `text` is nothing that can be injected.
     pub(crate) fn form(text: &str) -> Self {
-        let forms: Vec<String> = KINDS.iter().map(DisturbanceSpec::form).collect();
-        Self::Form {
-            found: text.to_owned(),
-            disturbances: forms.join(" "),
-        }
+        Self::Form(text.to_owned())
     }
 }
 

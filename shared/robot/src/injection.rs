@@ -7,7 +7,7 @@ use vigil_blocks::Event;
 
 use crate::description::Description;
 use crate::disturbance::Disturbance;
-use crate::disturbance_kind::{DisturbanceKind, PARAMETERS};
+use crate::disturbance_kind::{DisturbanceKind, DisturbanceSpec, KINDS, PARAMETERS};
 use crate::fault::{Fault, FaultError, FaultKind};
 
 /// A change of the simulated robot's health.
@@ -46,6 +46,17 @@ pub enum InjectionError {
     /// The time is wrong.
     #[error("'{0}' is not a time: allowed is any finite number of seconds from 0")]
     Time(String),
+}
+
+/// What can be injected, in words: of faults and disturbances, and of their end.
+#[must_use]
+pub fn forms() -> Vec<String> {
+    let faults = ["stuck:WHEEL", "encoder:WHEEL:zero|frozen|noise"];
+    let ends = ["clear:WHEEL", "clear:KIND[:PLACE]", "clear:all"];
+    let disturbances = KINDS.iter().map(DisturbanceSpec::form);
+    let faults = faults.into_iter().map(str::to_owned);
+    let ends = ends.into_iter().map(str::to_owned);
+    faults.chain(disturbances).chain(ends).collect()
 }
 
 impl Injection {

@@ -13,6 +13,7 @@ mod place;
 mod problem;
 mod ranges;
 mod reference;
+mod running;
 mod schema;
 mod state_risks;
 
@@ -25,5 +26,6 @@ pub use load::{Setup, load_decision, load_graph, load_model, load_robot, load_tr
 pub use problem::{Problem, SetupError};
 pub use ranges::{OutOfRange, Ranges};
 pub use reference::reference;
+pub use running::{NotRunning, RunningArgs, RunningGraph};
 pub use schema::schema;
 pub use state_risks::state_risks;

@@ -7,7 +7,7 @@ mod view;
 
 use std::time::{Duration, Instant};
 
-use vigil_setup::GraphArgs;
+use vigil_setup::RunningArgs;
 use vigil_terminal::{CommandError, Outcome, output};
 
 use document::Document;
@@ -24,7 +24,7 @@ const POLL: Duration = Duration::from_millis(50);
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    graph: GraphArgs,
+    running: RunningArgs,
     /// Print one JSON document; with --follow one a line, whenever something changes.
     #[arg(long)]
     json: bool,
@@ -38,7 +38,7 @@ pub struct Args {
 /// # Errors
 /// A configuration that is refused; a graph that does not run, or says nothing.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let mut view = View::join(&args.graph)?;
+    let mut view = View::join(&args.running)?;
     let mut document = view.first()?;
     print(args, &document).map_err(CommandError::failure)?;
     if !args.follow {

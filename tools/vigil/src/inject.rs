@@ -6,9 +6,10 @@ use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Graph, Topic};
 use vigil_robot::Injection;
 use vigil_robot::disturbance_kind::PARAMETERS;
-use vigil_setup::GraphArgs;
+use vigil_robot::injection::forms;
+use vigil_setup::RunningArgs;
 
-use vigil_terminal::{CommandError, Outcome};
+use vigil_terminal::{CommandError, Outcome, output};
 
 use crate::command::send;
 
@@ -16,11 +17,14 @@ use crate::command::send;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    graph: GraphArgs,
+    running: RunningArgs,
     /// What to break: `stuck:RM`, `encoder:LF:zero|frozen|noise`, or a disturbance, such as
-    /// `tether:20`. `clear:RM` and `clear:all` mend it. An unknown kind prints the list of all.
-    #[arg(value_name = "SPEC")]
-    spec: String,
+    /// `tether:20`. `clear:RM` and `clear:all` mend it.
+    #[arg(value_name = "SPEC", required_unless_present = "list")]
+    spec: Option<String>,
+    /// List what can be injected; no graph need run.
+    #[arg(long, conflicts_with = "spec")]
+    list: bool,
 }
 
 /// Sends the command and waits for the simulator's answer.
@@ -28,21 +32,19 @@ pub struct Args {
 /// # Errors
 /// A specification or configuration that is refused; no simulator that answers.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let setup = args.graph.load().map_err(CommandError::usage)?;
-    let change = Injection::parse_change(&args.spec, &setup.robot).map_err(CommandError::usage)?;
+    let Some(spec) = &args.spec else {
+        output::line(&forms().join("\n")).map_err(CommandError::failure)?;
+        return Ok(Outcome::Done);
+    };
+    let running = args.running.find().map_err(CommandError::failure)?;
+    let setup = &running.setup;
+    let change = Injection::parse_change(spec, &setup.robot).map_err(CommandError::usage)?;
     if !setup.file.control.allow_injection {
         let path = setup.path.display();
         let message = format!("{path}: control.allow_injection is false: injection is refused");
         return Err(CommandError::usage(message));
     }
-    let domain = setup.domain().map_err(CommandError::failure)?;
-    if domain.lock().map_err(CommandError::failure)?.is_some() {
-        let name = domain.graph();
-        return Err(CommandError::failure(format!(
-            "no graph named '{name}' is running"
-        )));
-    }
-    let link = Link::join(&domain, "vigil-inject").map_err(CommandError::failure)?;
+    let link = Link::join(&running.domain, "vigil-inject").map_err(CommandError::failure)?;
     let graph = Graph::SharedMemory(link);
     let simulator = ServiceName::SensorSim;
     let mut sender = graph
@@ -58,7 +60,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     block.parameter[..PARAMETERS].copy_from_slice(&wire.parameter);
     match send(&graph, simulator, sender.as_mut())? {
         Some(true) => {
-            eprintln!("injected {}", args.spec);
+            eprintln!("injected {spec}");
             Ok(Outcome::Done)
         }
         Some(false) => Err(CommandError::failure("the simulator refused the injection")),

@@ -8,6 +8,8 @@ use std::process::Command;
 
 use vigil_terminal::{CommandError, Outcome};
 
+use crate::beside;
+
 /// The program's name.
 const PROGRAM: &str = "vigil-lab";
 /// Its commands, and what each does.
@@ -53,20 +55,7 @@ pub fn run(words: &[OsString]) -> Result<Outcome, CommandError> {
 }
 
 fn replace(words: &[OsString]) -> Result<Infallible, CommandError> {
-    let here = std::env::current_exe().map_err(CommandError::failure)?;
-    let program = here.with_file_name(PROGRAM);
-    if !program.is_file() {
-        let release = if cfg!(debug_assertions) {
-            ""
-        } else {
-            " --release"
-        };
-        let message = format!(
-            "{} is not built: run `cargo build{release} -p {PROGRAM}`",
-            program.display()
-        );
-        return Err(CommandError::usage(message));
-    }
+    let program = beside::program(PROGRAM)?;
     let error = Command::new(&program).args(words).exec();
     Err(CommandError::failure(format!(
         "{}: {error}",

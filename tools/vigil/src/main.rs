@@ -1,23 +1,30 @@
 //! `vigil`: the operator's tool. Never in the data path of a running graph.
 
+mod beside;
 mod bindings;
 mod check;
 mod check_publisher;
 mod command;
 mod config;
+mod events;
 mod faults;
 mod findings;
+mod graph;
 mod inject;
 mod laboratory;
+mod list;
 mod print_channels;
 mod print_types;
 mod publisher;
 mod record;
+mod run;
+mod stop;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use vigil_launcher::LauncherArgs;
 use vigil_terminal::exit_code;
 
 /// Fault detection, diagnosis and recovery for mobile robots.
@@ -32,13 +39,18 @@ struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Check(check::Args),
-    CheckPublisher(check_publisher::Args),
-    Config(config::Args),
+    Run(Box<LauncherArgs>),
+    List(list::Args),
+    Stop(stop::Args),
+    Events(events::Args),
     Faults(faults::Args),
     Ack(faults::AckArgs),
     Clear(faults::ClearArgs),
     Inject(inject::Args),
+    Check(check::Args),
+    CheckPublisher(check_publisher::Args),
+    Config(config::Args),
+    Graph(graph::Args),
     Record(record::Args),
     #[command(name = "channels")]
     PrintChannels(print_channels::Args),
@@ -51,6 +63,12 @@ enum Command {
 
 fn main() -> ExitCode {
     exit_code(match Args::parse().command {
+        // The launcher understands the same words once more.
+        Command::Run(_) => run::run(),
+        Command::List(args) => list::run(&args),
+        Command::Stop(args) => stop::run(&args),
+        Command::Events(args) => events::run(&args),
+        Command::Graph(args) => graph::run(&args),
         Command::Check(args) => check::run(&args),
         Command::CheckPublisher(args) => check_publisher::run(&args),
         Command::Config(args) => config::run(&args),

@@ -10,6 +10,7 @@ use vigil_cycle::port::Link;
 use vigil_cycle::watchdog::Settings;
 
 use super::*;
+use crate::locks::Claim;
 use crate::plan::tests::plan;
 use crate::watchdog::WatchdogDriver;
 
@@ -22,7 +23,7 @@ fn until(mut look: impl FnMut() -> bool) {
     let began = Instant::now();
     while !look() {
         assert!(began.elapsed() < NEVER, "it never happened");
-        std::thread::sleep(POLL);
+        std::thread::sleep(Duration::from_millis(5));
     }
 }
 
@@ -54,8 +55,15 @@ impl SleepingGraph {
         }
     }
 
+    fn locks(&self) -> Locks {
+        match Claim::take(&self.domain).unwrap() {
+            Claim::Free(locks) | Claim::Orphaned(locks) => locks,
+            Claim::Held => panic!("the launcher lives"),
+        }
+    }
+
     fn start(&self) -> Children {
-        Children::start(&self.plan, &self.domain).unwrap()
+        Children::start(&self.plan, &self.domain, self.locks()).unwrap()
     }
 
     /// Looks after the children until the detector has been started again.
@@ -85,13 +93,13 @@ fn a_service_that_is_killed_is_started_again_and_all_are_stopped() {
     let mut graph = SleepingGraph::new("killed");
     let mut children = graph.start();
     let listed = fs::read_to_string(graph.domain.processes_file()).unwrap();
-    let ids = children.services.iter().map(|s| s.child.id());
+    let ids = children.services.iter().map(|s| s.process.id());
     let expected = ServiceName::ALL.iter().zip(ids);
     let expected = expected.map(|(name, id)| format!("{} {id}\n", name.as_str()));
     assert_eq!(listed, expected.collect::<String>());
 
     children.end(ServiceName::Detector, "is killed by a test");
-    children.services[1].child.wait().unwrap();
+    assert!(children.services[1].process.wait(NEVER));
     assert!(!children.look_after(&graph.plan, &mut graph.observer));
     assert!(children.dead().eq([ServiceName::Detector]));
     graph.await_restart(&mut children);
@@ -104,7 +112,7 @@ fn a_service_that_is_killed_is_started_again_and_all_are_stopped() {
 
     children.stop();
     for service in &mut children.services {
-        assert!(service.child.try_wait().unwrap().is_some());
+        assert!(service.process.ended().is_some());
     }
     assert!(children.report(ServiceName::Detector).is_none());
     assert_eq!(children.gave_up(), None);
@@ -120,8 +128,8 @@ fn a_service_whose_assertion_fails_again_is_given_up_and_the_timeline_says_why()
             "7\na.rs:1:2\nat work\nx is y\n",
         )
         .unwrap();
-        children.services[1].child.kill().unwrap();
-        children.services[1].child.wait().unwrap();
+        children.services[1].process.kill();
+        assert!(children.services[1].process.wait(NEVER));
     };
     fail(&mut children);
     graph.await_restart(&mut children);
@@ -145,7 +153,8 @@ fn a_program_that_is_not_there_is_named() {
     let graph = SleepingGraph::new("missing");
     let supervisor = graph.plan.programs.join("vigil-supervisor");
     fs::remove_file(&supervisor).unwrap();
-    let error = Children::start(&graph.plan, &graph.domain).err().unwrap();
+    let error = Children::start(&graph.plan, &graph.domain, graph.locks());
+    let error = error.err().unwrap();
     let name = supervisor.display().to_string();
     assert!(error.to_string().starts_with(&name), "{error}");
 }
@@ -165,6 +174,34 @@ fn a_service_that_never_reports_is_ended_by_the_watchdog_and_started_again() {
     });
     let found = graph.events(EventKind::Watchdog);
     assert_eq!(found, ["did not start up in time"]);
-    children.services[1].child.wait().unwrap();
+    assert!(children.services[1].process.wait(NEVER));
     graph.await_restart(&mut children);
+}
+
+#[test]
+fn services_of_a_launcher_that_is_gone_are_adopted_restarted_and_stopped() {
+    let mut graph = SleepingGraph::new("adopted");
+    let mut children = graph.start();
+    let started: Vec<u32> = children.services.iter().map(|s| s.process.id()).collect();
+    assert!(matches!(Claim::take(&graph.domain).unwrap(), Claim::Held));
+    // As if the launcher had been killed: nobody stops its services, and its lock is free.
+    let orphans = std::mem::take(&mut children.services);
+    drop(children);
+    let Claim::Orphaned(locks) = Claim::take(&graph.domain).unwrap() else {
+        panic!("the services hold the graph's lock");
+    };
+    let mut children = Children::adopt(&graph.plan, &graph.domain, locks).unwrap();
+    let adopted: Vec<u32> = children.services.iter().map(|s| s.process.id()).collect();
+    assert_eq!(adopted, started);
+
+    children.end(ServiceName::Detector, "is killed by a test");
+    graph.await_restart(&mut children);
+    let listed = graph.domain.processes();
+    assert_eq!(listed.launcher, Some(std::process::id()));
+    assert_ne!(listed.services[1].1, started[1]);
+    assert_eq!(listed.services[2].1, started[2]);
+    children.stop();
+    for service in children.services.iter_mut().chain(&mut { orphans }) {
+        assert!(service.process.wait(NEVER));
+    }
 }

@@ -45,7 +45,7 @@ fn follow(command: &[String], folder: &Path) -> Output {
         "scripts/up" => {
             let script = fs::read_to_string(root().join("scripts/up")).unwrap();
             let last = script.lines().last().unwrap();
-            assert_eq!(last, "exec \"$root/target/release/vigil-launcher\" \"$@\"");
+            assert_eq!(last, "exec \"$root/target/release/vigil\" run \"$@\"");
             let graph = format!("t{}-your-robot", std::process::id());
             let more = ["--json".to_owned(), "--graph".to_owned(), graph];
             (vigil.with_file_name("vigil-launcher"), more.to_vec())

@@ -3,7 +3,7 @@
 use vigil_blocks::{Control, ControlCommand};
 use vigil_cycle::Topic;
 use vigil_cycle::topic::ServiceName;
-use vigil_setup::GraphArgs;
+use vigil_setup::RunningArgs;
 use vigil_terminal::{CommandError, Outcome};
 
 use super::document::{Document, NamedFault};
@@ -16,7 +16,7 @@ use crate::command::send;
 #[derive(Debug, clap::Args)]
 pub struct AckArgs {
     #[command(flatten)]
-    graph: GraphArgs,
+    running: RunningArgs,
     /// Name or number of the fault, as `vigil faults` lists it; `all` for every one.
     #[arg(value_name = "FAULT")]
     fault: String,
@@ -26,7 +26,7 @@ pub struct AckArgs {
 #[derive(Debug, clap::Args)]
 pub struct ClearArgs {
     #[command(flatten)]
-    graph: GraphArgs,
+    running: RunningArgs,
 }
 
 /// Acknowledges.
@@ -34,7 +34,7 @@ pub struct ClearArgs {
 /// # Errors
 /// A fault that there is not, or that nobody has to acknowledge; a supervisor that does not answer.
 pub fn acknowledge(args: &AckArgs) -> Result<Outcome, CommandError> {
-    let mut view = View::join(&args.graph)?;
+    let mut view = View::join(&args.running)?;
     let document = view.first()?;
     let number = match args.fault.as_str() {
         "all" => 0,
@@ -53,7 +53,7 @@ pub fn acknowledge(args: &AckArgs) -> Result<Outcome, CommandError> {
 /// # Errors
 /// As [`acknowledge`].
 pub fn clear(args: &ClearArgs) -> Result<Outcome, CommandError> {
-    let view = View::join(&args.graph)?;
+    let view = View::join(&args.running)?;
     match order(&view, ControlCommand::Forget, 0)? {
         true => eprintln!("forgot the faults that were over"),
         false => eprintln!("no fault was over"),

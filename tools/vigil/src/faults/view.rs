@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use vigil_blocks::{Block, Faults};
 use vigil_cycle::port::Link;
-use vigil_cycle::{Clock, Domain, Graph, KeptBlock, Monotonic, Receiver, Topic};
-use vigil_setup::{GraphArgs, Setup};
+use vigil_cycle::{Clock, Graph, KeptBlock, Monotonic, Receiver, Topic};
+use vigil_setup::{RunningArgs, RunningGraph};
 use vigil_terminal::CommandError;
 
 use super::document::Document;
@@ -19,10 +19,7 @@ const POLL: Duration = Duration::from_millis(5);
 
 /// The faults of a graph, as they come.
 pub struct View {
-    /// The graph's configuration, which gives names.
-    pub setup: Setup,
-    /// Where it runs.
-    pub domain: Domain,
+    running: RunningGraph,
     /// Its topics.
     pub graph: Graph,
     faults: Box<dyn Receiver<Faults>>,
@@ -32,18 +29,15 @@ impl View {
     /// Joins a running graph.
     ///
     /// # Errors
-    /// A configuration that is refused; a graph that does not run.
-    pub fn join(args: &GraphArgs) -> Result<Self, CommandError> {
-        let setup = args.load().map_err(CommandError::usage)?;
-        demand_running(&setup.file.graph.name)?;
-        let domain = setup.domain().map_err(CommandError::failure)?;
-        let link = Link::join(&domain, "vigil-faults").map_err(CommandError::failure)?;
+    /// A graph that does not run; the transport's.
+    pub fn join(args: &RunningArgs) -> Result<Self, CommandError> {
+        let running = args.find().map_err(CommandError::failure)?;
+        let link = Link::join(&running.domain, "vigil-faults").map_err(CommandError::failure)?;
         let graph = Graph::SharedMemory(link);
         let faults = graph.receiver(Topic::Faults);
         Ok(Self {
             faults: faults.map_err(CommandError::failure)?,
-            setup,
-            domain,
+            running,
             graph,
         })
     }
@@ -61,10 +55,10 @@ impl View {
             }
             std::thread::sleep(POLL);
         }
-        let kept = KeptBlock::<Faults>::read_file(&self.domain.faults_file());
+        let kept = KeptBlock::<Faults>::read_file(&self.running.domain.faults_file());
         let kept = kept.map(|block| self.named(&block)).transpose()?;
         kept.map(|document| document.gone_stale()).ok_or_else(|| {
-            let name = self.domain.graph();
+            let name = self.running.domain.graph();
             CommandError::failure(format!(
                 "graph '{name}': nothing has been said of faults yet"
             ))
@@ -88,29 +82,18 @@ impl View {
     }
 
     fn named(&self, block: &Faults) -> Result<Document, CommandError> {
-        if block.tree_hash == self.setup.tree.hash() {
-            return Ok(Document::new(block, &self.setup));
+        let setup = &self.running.setup;
+        if block.tree_hash == setup.tree.hash() {
+            return Ok(Document::new(block, setup));
         }
-        let (name, file) = (self.domain.graph(), self.setup.path.display());
-        Err(CommandError::usage(format!(
-            "graph '{name}' has another fault tree than {file}: give its file with --config"
+        let name = self.running.domain.graph();
+        Err(CommandError::failure(format!(
+            "graph '{name}' was started anew, with another fault tree"
         )))
     }
 
     /// True while the graph runs.
     pub fn is_running(&self) -> bool {
-        Domain::running(self.domain.graph()).is_some()
+        self.running.lives()
     }
-}
-
-/// Refuses the name of a graph that does not run.
-fn demand_running(name: &str) -> Result<(), CommandError> {
-    Domain::running(name).map(|_| ()).ok_or_else(|| {
-        let others = Domain::all_running();
-        let others = match others.is_empty() {
-            true => "none runs".to_owned(),
-            false => format!("there run: {}", others.join(", ")),
-        };
-        CommandError::failure(format!("no graph named '{name}' is running; {others}"))
-    })
 }

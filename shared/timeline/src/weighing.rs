@@ -2,23 +2,23 @@
 
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use vigil_blocks::{ValueKind, Weighing};
 
 /// What a decision was weighed from, with the names of the decision model.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NamedWeighing {
     /// The most probable states, at most two.
     pub states: Vec<NamedState>,
     /// The best of the other actions.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub second: Option<NamedSecond>,
     /// What the actions' numbers are: `value` (rewards to come), `votes` or `entropy`.
-    pub measure: &'static str,
+    pub measure: String,
 }
 
 /// A state of the decision model.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NamedState {
     /// Its name.
     pub name: String,
@@ -27,7 +27,7 @@ pub struct NamedState {
 }
 
 /// An action that was not taken.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NamedSecond {
     /// Its name.
     pub action: String,
@@ -53,7 +53,8 @@ impl NamedWeighing {
                 ValueKind::Value => "value",
                 ValueKind::Votes => "votes",
                 ValueKind::Entropy => "entropy",
-            },
+            }
+            .to_owned(),
         }
     }
 }
@@ -68,7 +69,7 @@ impl fmt::Display for NamedWeighing {
         };
         let (size, is_less) = (less.abs(), *less >= 0.0);
         let word = if is_less { "less" } else { "more" };
-        match self.measure {
+        match self.measure.as_str() {
             "votes" => write!(f, "; {action} has {size:.2} {word} of the votes"),
             "entropy" => write!(f, "; {action} would tell {size:.3} {word}"),
             _ => write!(f, "; {action} would earn {size:.2} {word}"),

@@ -1,7 +1,8 @@
 use vigil_robot::context_table::DeclaredContext;
 
+use vigil_blocks::MODE_MULTIPLE;
+
 use super::*;
-use crate::plan::tests::plan;
 
 const S: u64 = 1_000_000_000;
 
@@ -15,8 +16,14 @@ fn event(t_s: u64, kind: EventKind, what: u32, value: u64) -> Event {
     }
 }
 
+fn setup() -> Setup {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+    let config = std::path::PathBuf::from(format!("{root}/config/rover.toml"));
+    vigil_setup::load_graph(&config, |_| {}).unwrap()
+}
+
 fn timeline() -> Timeline {
-    Timeline::new(&plan(&[]).unwrap().setup)
+    Timeline::new(&setup())
 }
 
 #[test]
@@ -25,7 +32,7 @@ fn events_are_told_in_order_from_the_beginning_of_the_drive() {
     timeline.add(ServiceName::Detector, &event(12, EventKind::Alarm, 0, 0));
     timeline.add(ServiceName::SensorSim, &event(10, EventKind::Ready, 0, 0));
     timeline.add(ServiceName::Supervisor, &event(13, EventKind::Miss, 0, 4));
-    timeline.add_overwritten(2);
+    timeline.add_overwritten(ServiceName::Detector, 2);
     let lines: Vec<String> = timeline.entries().iter().map(ToString::to_string).collect();
     assert_eq!(
         lines,
@@ -74,8 +81,11 @@ fn misses_after_the_end_of_a_recording_are_no_events() {
     timeline.add(ServiceName::Detector, &event(19, EventKind::Miss, 0, 1));
     timeline.add(ServiceName::SensorSim, &end);
     timeline.add(ServiceName::Detector, &event(21, EventKind::Miss, 0, 1));
-    timeline.settle(false);
-    let events: Vec<_> = timeline.entries().iter().map(|entry| entry.event).collect();
+    let events: Vec<_> = timeline
+        .entries()
+        .into_iter()
+        .map(|entry| entry.event)
+        .collect();
     assert_eq!(events, ["miss", "end-of-recording"]);
     assert_eq!(timeline.recording_end_ns(), Some(20 * S));
 }
@@ -134,7 +144,7 @@ fn blind_time_is_added_up_by_cause_until_the_end() {
 
 #[test]
 fn a_change_that_is_no_fault_is_told_by_its_name() {
-    let mut setup = plan(&[]).unwrap().setup;
+    let mut setup = setup();
     setup.robot.context = ["load", "ground"]
         .map(|name| DeclaredContext {
             name: name.to_owned(),
@@ -181,4 +191,48 @@ fn steps_of_the_decision_model_are_for_programs_alone() {
     assert_eq!(entries[0].what, format!("{action} {observation}"));
     assert_eq!(entries[1].step.as_ref().unwrap().observation, None);
     assert!(entries.iter().all(|entry| !entry.is_told()));
+}
+
+#[test]
+fn events_wait_for_the_drive_unless_it_is_late_and_are_handed_out_once() {
+    let mut timeline = timeline();
+    let events = |timeline: &mut Timeline, is_late| {
+        let new = timeline.take_new(is_late);
+        let new = new.into_iter().map(|entry| (entry.event, entry.t_s));
+        new.collect::<Vec<_>>()
+    };
+    timeline.add(ServiceName::Detector, &event(9, EventKind::Blind, 0, 0));
+    assert_eq!(events(&mut timeline, false), []);
+    assert_eq!(events(&mut timeline, true), [("blind".to_owned(), None)]);
+    timeline.add(ServiceName::Detector, &event(12, EventKind::Alarm, 0, 0));
+    timeline.add(ServiceName::SensorSim, &event(10, EventKind::Ready, 0, 0));
+    let new = [
+        ("ready".to_owned(), Some(0.0)),
+        ("alarm".to_owned(), Some(2.0)),
+    ];
+    assert_eq!(events(&mut timeline, false), new);
+    assert_eq!(events(&mut timeline, true), []);
+}
+
+#[test]
+fn what_another_launcher_has_told_is_not_told_again_and_times_go_on() {
+    let mut first = timeline();
+    first.begin(10 * S);
+    let alarm = event(12, EventKind::Alarm, 0, 0);
+    first.add(ServiceName::Detector, &alarm);
+    let mut second = timeline();
+    for entry in first.take_new(false) {
+        second.skip_told(&entry);
+    }
+    second.add_overwritten(ServiceName::Detector, 7);
+    second.add(ServiceName::Detector, &alarm);
+    second.add(ServiceName::Detector, &event(13, EventKind::Cleared, 0, 0));
+    second.add(ServiceName::Supervisor, &event(11, EventKind::Miss, 0, 1));
+    let new = second.take_new(false);
+    let new: Vec<_> = new.iter().map(|e| (e.event.as_str(), e.t_s)).collect();
+    assert_eq!(new, [("miss", Some(1.0)), ("cleared", Some(3.0))]);
+    assert_eq!(second.entries().len(), 3, "all that is known");
+    assert_eq!(second.overwritten(), 0);
+    second.add_overwritten(ServiceName::Detector, 1);
+    assert_eq!(second.overwritten(), 1);
 }

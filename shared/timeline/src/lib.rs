@@ -1,0 +1,18 @@
+#![doc = include_str!("../README.md")]
+
+mod entry;
+mod event_file;
+mod namer;
+mod timeline;
+mod told;
+mod wall_clock;
+mod weighing;
+mod words;
+
+pub use entry::{NamedFault, NamedStep, TimelineEntry};
+pub use event_file::{EventReader, EventWriter};
+pub use timeline::Timeline;
+pub use told::{MISSES_APART_NS, told};
+pub use wall_clock::WallClock;
+pub use weighing::{NamedSecond, NamedState, NamedWeighing};
+pub use words::watchdog as watchdog_text;

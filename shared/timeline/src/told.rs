@@ -1,0 +1,95 @@
+//! What people are told: misses in a row are one line.
+
+use crate::entry::TimelineEntry;
+
+/// Misses of a service that lie closer are told together, ns.
+pub const MISSES_APART_NS: u64 = 1_000_000_000;
+
+/// The entries for people: without what only programs read, and misses of a service that follow
+/// each other within a second as one.
+#[must_use]
+pub fn told(entries: &[TimelineEntry]) -> Vec<TimelineEntry> {
+    let mut told: Vec<TimelineEntry> = Vec::new();
+    // For each miss at the end of `told`, when the last that it stands for was, ns.
+    let mut last_ns: Vec<u64> = Vec::new();
+    for entry in entries.iter().filter(|entry| entry.is_told()) {
+        if !entry.is_miss() {
+            last_ns.clear();
+        } else {
+            let misses = told.len() - last_ns.len();
+            let goes_on = |(miss, last_ns): (&TimelineEntry, &u64)| {
+                miss.service == entry.service && entry.t_ns - last_ns <= MISSES_APART_NS
+            };
+            if let Some(at) = told[misses..].iter().zip(&last_ns).position(goes_on) {
+                told[misses + at].add_miss(entry);
+                last_ns[at] = entry.t_ns;
+                continue;
+            }
+            last_ns.push(entry.t_ns);
+        }
+        told.push(entry.clone());
+    }
+    told
+}
+
+impl TimelineEntry {
+    /// True of missed cycles.
+    #[must_use]
+    pub fn is_miss(&self) -> bool {
+        self.event == "miss"
+    }
+
+    /// Stands from now on for this later miss, too.
+    pub fn add_miss(&mut self, later: &Self) {
+        let count = self.count.unwrap_or(0) + later.count.unwrap_or(0);
+        let during_s = later.t_ns.saturating_sub(self.t_ns) as f64 * 1e-9;
+        self.count = Some(count);
+        self.what = format!("{count} cycles in {during_s:.1} s");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(t_s: f64, service: &str, event: &str) -> TimelineEntry {
+        TimelineEntry {
+            t_s: Some(t_s),
+            t_ns: (t_s * 1e9) as u64,
+            service: service.to_owned(),
+            event: event.to_owned(),
+            count: (event == "miss").then_some(2),
+            what: "2 cycles".to_owned(),
+            ..TimelineEntry::default()
+        }
+    }
+
+    #[test]
+    fn misses_in_a_row_are_one_line_for_each_service() {
+        let entries = [
+            entry(1.0, "detector", "miss"),
+            entry(1.2, "identifier", "miss"),
+            entry(1.5, "detector", "miss"),
+            entry(2.4, "detector", "miss"),
+            entry(4.0, "detector", "miss"),
+            entry(4.1, "detector", "alarm"),
+            entry(4.2, "detector", "miss"),
+        ];
+        let told = told(&entries);
+        let lines: Vec<_> = told
+            .iter()
+            .map(|entry| (entry.service.as_str(), entry.what.as_str(), entry.count))
+            .collect();
+        assert_eq!(
+            lines,
+            [
+                ("detector", "6 cycles in 1.4 s", Some(6)),
+                ("identifier", "2 cycles", Some(2)),
+                ("detector", "2 cycles", Some(2)),
+                ("detector", "2 cycles", None),
+                ("detector", "2 cycles", Some(2)),
+            ]
+        );
+        assert_eq!(told[0].t_s, Some(1.0));
+    }
+}
