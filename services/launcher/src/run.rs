@@ -159,7 +159,7 @@ impl Prepared {
             plan: &plan,
             teller: &mut teller,
         };
-        let ended = watch.to_end(&mut observer, &mut children);
+        let ended = watch.until_end(&mut observer, &mut children);
         observer.close(DRAIN);
         children.stop();
         observer.poll();
@@ -232,7 +232,7 @@ struct Watch<'a> {
 
 impl Watch<'_> {
     /// Watches until the end; returns why it ended.
-    fn to_end(&mut self, observer: &mut HealthObserver, children: &mut Children) -> EndReason {
+    fn until_end(&mut self, observer: &mut HealthObserver, children: &mut Children) -> EndReason {
         let plan = self.plan;
         let mut waiting = Waiting::new(&plan.setup);
         let services = plan.services().collect();
