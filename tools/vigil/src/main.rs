@@ -23,7 +23,7 @@ mod stop;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{Arg, Parser, Subcommand};
 use vigil_launcher::LauncherArgs;
 use vigil_terminal::exit_code;
 
@@ -48,9 +48,11 @@ enum Command {
     Clear(faults::ClearArgs),
     Inject(inject::Args),
     Check(check::Args),
+    #[command(mut_args(only_of_the_border))]
     CheckPublisher(check_publisher::Args),
     Config(config::Args),
     Graph(graph::Args),
+    #[command(mut_args(only_of_the_border))]
     Record(record::Args),
     #[command(name = "channels")]
     PrintChannels(print_channels::Args),
@@ -59,6 +61,13 @@ enum Command {
     /// A command of the laboratory.
     #[command(external_subcommand)]
     Laboratory(Vec<OsString>),
+}
+
+/// Options of a graph that mean nothing to publishers are not shown there.
+fn only_of_the_border(arg: Arg) -> Arg {
+    let id = arg.get_id().as_str();
+    let is_other = ["seed", "identifier", "replay", "runs", "speed"].contains(&id);
+    arg.hide(is_other)
 }
 
 fn main() -> ExitCode {
