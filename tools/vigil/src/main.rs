@@ -18,12 +18,13 @@ mod print_types;
 mod publisher;
 mod record;
 mod run;
+mod shell;
 mod stop;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::{Arg, Parser, Subcommand};
+use clap::{Arg, CommandFactory, Parser, Subcommand};
 use vigil_launcher::LauncherArgs;
 use vigil_terminal::exit_code;
 
@@ -58,6 +59,8 @@ enum Command {
     PrintChannels(print_channels::Args),
     #[command(name = "types")]
     PrintTypes(print_types::Args),
+    Completions(shell::CompletionsArgs),
+    Man(shell::ManArgs),
     /// A command of the laboratory.
     #[command(external_subcommand)]
     Laboratory(Vec<OsString>),
@@ -88,6 +91,8 @@ fn main() -> ExitCode {
         Command::Record(args) => record::run(&args),
         Command::PrintChannels(args) => print_channels::run(&args),
         Command::PrintTypes(args) => print_types::run(&args),
+        Command::Completions(args) => shell::completions(&args, Args::command()),
+        Command::Man(args) => shell::man(&args, Args::command()),
         Command::Laboratory(words) => laboratory::run(&words),
     })
 }
