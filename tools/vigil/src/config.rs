@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_setup::graph_file::GraphFile;
 use vigil_setup::{Document, GraphArgs, reference, schema};
@@ -41,11 +42,15 @@ struct Form {
 }
 
 /// The values in effect.
-#[derive(Debug, Serialize)]
-struct Effective<'a> {
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Effective<'a> {
+    /// Version of this document.
     schema_version: u32,
+    /// The graph file.
     path: String,
+    /// Hash of the configuration and every file that it names.
     config_hash: String,
+    /// The values in effect; see `vigil config --schema`.
     config: &'a GraphFile,
     /// Of each key: `default`, `line N` of the file, or the option that gave it.
     origin: BTreeMap<String, String>,

@@ -18,6 +18,7 @@ mod print_types;
 mod publisher;
 mod record;
 mod run;
+mod schemas;
 mod shell;
 mod stop;
 
@@ -59,6 +60,7 @@ enum Command {
     PrintChannels(print_channels::Args),
     #[command(name = "types")]
     PrintTypes(print_types::Args),
+    Schema(schemas::Args),
     Completions(shell::CompletionsArgs),
     Man(shell::ManArgs),
     /// A command of the laboratory.
@@ -91,6 +93,7 @@ fn main() -> ExitCode {
         Command::Record(args) => record::run(&args),
         Command::PrintChannels(args) => print_channels::run(&args),
         Command::PrintTypes(args) => print_types::run(&args),
+        Command::Schema(args) => schemas::run(&args),
         Command::Completions(args) => shell::completions(&args, Args::command()),
         Command::Man(args) => shell::man(&args, Args::command()),
         Command::Laboratory(words) => laboratory::run(&words),

@@ -86,7 +86,8 @@ mod tests {
         for name in &commands {
             let path = folder.path().join(format!("vigil-{name}.1"));
             let page = std::fs::read_to_string(path).unwrap();
-            assert!(page.contains(&format!("vigil\\-{name}")), "{name}: {page}");
+            let title = format!("vigil-{name}").replace('-', "\\-");
+            assert!(page.contains(&title), "{title}: {page}");
         }
         let run = std::fs::read_to_string(folder.path().join("vigil-run.1")).unwrap();
         assert!(run.contains("\\-\\-start\\-timeout"), "{run}");
