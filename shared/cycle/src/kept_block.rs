@@ -42,7 +42,7 @@ impl<T: Block> KeptBlock<T> {
         if file.metadata()?.len() != Self::BYTES as u64 {
             file.set_len(0)?;
         }
-        allocate(&file, Self::BYTES)?;
+        reserve(&file, Self::BYTES as u64)?;
         // SAFETY: a new shared mapping of a file that is as long as the mapping; the kernel chooses
         // its place, and the result is checked.
         #[allow(unsafe_code)]
@@ -143,10 +143,10 @@ fn whole<T: Block>(words: &[u64]) -> Option<(u64, Box<T>)> {
 
 /// Gives a file so many bytes that are there: a store to a mapping of bytes that a full disk has no
 /// room for would end the process.
-fn allocate(file: &File, bytes: usize) -> io::Result<()> {
+pub fn reserve(file: &File, bytes: u64) -> io::Result<()> {
     // SAFETY: a plain system call on a descriptor that is open.
     #[allow(unsafe_code)]
-    let error = unsafe { libc::posix_fallocate(file.as_raw_fd(), 0, bytes as libc::off_t) };
+    let error = unsafe { libc::posix_fallocate(file.as_raw_fd(), 0, bytes.cast_signed()) };
     match error {
         0 => Ok(()),
         error => Err(io::Error::from_raw_os_error(error)),

@@ -42,7 +42,7 @@ pub use found_process::FoundProcess;
 pub use health::HealthBoard;
 pub use input::{InputAccount, Writer};
 pub use keep_awake::KeepAwake;
-pub use kept_block::KeptBlock;
+pub use kept_block::{KeptBlock, reserve};
 pub use latency::Latency;
 pub use launcher_lock::{LauncherLock, Processes};
 pub use on_miss::OnMiss;

@@ -1,0 +1,5 @@
+//! `vigil-blackbox`.
+
+mod ring;
+
+fn main() {}
