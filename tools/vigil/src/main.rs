@@ -18,7 +18,10 @@ mod print_types;
 mod publisher;
 mod record;
 mod run;
+mod status;
 mod stop;
+mod top;
+mod watch;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -41,6 +44,8 @@ struct Args {
 enum Command {
     Run(Box<LauncherArgs>),
     List(list::Args),
+    Status(status::Args),
+    Top(top::Args),
     Stop(stop::Args),
     Events(events::Args),
     Faults(faults::Args),
@@ -66,6 +71,8 @@ fn main() -> ExitCode {
         // The launcher understands the same words once more.
         Command::Run(_) => run::run(),
         Command::List(args) => list::run(&args),
+        Command::Status(args) => status::run(&args),
+        Command::Top(args) => top::run(&args),
         Command::Stop(args) => stop::run(&args),
         Command::Events(args) => events::run(&args),
         Command::Graph(args) => graph::run(&args),

@@ -1,0 +1,160 @@
+//! All that is known of a graph, with names: for programs, and for those who draw it.
+
+use serde::Serialize;
+use vigil_blocks::OverallState;
+use vigil_setup::Setup;
+use vigil_timeline::{TimelineEntry, WallClock};
+
+use super::belief::{Detector, Diagnosis};
+use super::decision::Decision;
+use super::input::Input;
+use super::service::Service;
+use super::state::GraphState;
+use crate::faults::document::{self as faults, NamedFault, Now};
+use crate::watch::{Percentiles, View};
+
+/// Without a block for so long nothing is known.
+const STALE_S: f64 = 1.0;
+/// Newest events that are told.
+const EVENTS: usize = 20;
+
+/// How a graph is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Document {
+    schema_version: u32,
+    pub graph: String,
+    /// In one word.
+    pub state: GraphState,
+    /// What the supervisor says; `stale` while it says nothing.
+    pub overall: &'static str,
+    /// Why it is not known how the robot is; null while it is.
+    pub unknown_because: Option<String>,
+    /// Process id; null without one.
+    pub launcher: Option<u32>,
+    /// By the calendar: RFC 3339, UTC.
+    pub wall: String,
+    /// Since the graph's start.
+    pub up_s: Option<f64>,
+    /// Of the schedule.
+    pub rate_hz: f64,
+    /// Where the configuration was read from.
+    pub config: String,
+    /// Those that are kept; the newest change first.
+    pub faults: Vec<NamedFault>,
+    /// What is present beside them, and has no place.
+    pub faults_dropped: u32,
+    pub detector: Option<Detector>,
+    pub diagnosis: Option<Diagnosis>,
+    pub decision: Option<Decision>,
+    pub services: Vec<Service>,
+    pub end_to_end: Option<Percentiles>,
+    pub input: Option<Input>,
+    /// The newest events; the newest last.
+    pub events: Vec<TimelineEntry>,
+}
+
+impl Document {
+    /// A view with the names that a configuration gives.
+    pub fn new(view: &View, setup: &Setup, now: Now) -> Self {
+        let now_ns = now.monotonic_ns;
+        let age_s = |at_ns: u64| now_ns.saturating_sub(at_ns) as f64 * 1e-9;
+        let fresh = view.faults.as_ref().filter(|block| {
+            let is_of_tree = block.tree_hash == setup.tree.hash();
+            is_of_tree && age_s(block.header.t_publish_ns) <= STALE_S
+        });
+        let overall = fresh.and_then(|block| OverallState::from_repr(block.overall));
+        let faults = view.faults.as_ref().filter(|block| {
+            // Names of another tree would be wrong.
+            block.tree_hash == setup.tree.hash()
+        });
+        let faults = faults.map(|block| faults::Document::at(block, setup, now));
+        let detector = view.detection.as_ref().map(|block| Detector::new(block));
+        let state = match view.has_ended {
+            true => GraphState::Ended,
+            false => GraphState::new(overall, view.launcher.is_some()),
+        };
+        let blind = detector.as_ref().and_then(|it| it.blind);
+        let unknown_because = match (view.has_ended, overall, blind) {
+            (true, ..) => Some("the graph runs no longer".to_owned()),
+            (_, Some(OverallState::Stale), Some(cause)) => Some(format!("BLIND: {cause}")),
+            (_, Some(OverallState::Stale), None) => Some("nothing is seen".to_owned()),
+            (_, None, _) => Some(silence(view, age_s)),
+            _ => None,
+        };
+        let from = view.events.len().saturating_sub(EVENTS);
+        Self {
+            schema_version: 1,
+            graph: setup.file.graph.name.clone(),
+            state,
+            overall: overall.unwrap_or(OverallState::Stale).name(),
+            unknown_because,
+            launcher: view.launcher,
+            wall: WallClock::now().rfc3339(now_ns),
+            up_s: view.up_s.map(f64::round),
+            rate_hz: setup.file.graph.rate_hz,
+            config: setup.path.display().to_string(),
+            faults_dropped: faults.as_ref().map_or(0, |it| it.dropped),
+            faults: faults.map(|it| it.faults).unwrap_or_default(),
+            detector,
+            diagnosis: view
+                .diagnosis
+                .as_ref()
+                .filter(|block| block.tree_hash == setup.tree.hash())
+                .map(|block| Diagnosis::new(block, &setup.tree)),
+            decision: view
+                .action
+                .as_ref()
+                .map(|block| Decision::new(block, setup)),
+            services: Service::all(view, now_ns),
+            end_to_end: view.end_to_end.percentiles(),
+            input: view
+                .frame
+                .as_ref()
+                .map(|frame| Input::new(frame, &setup.robot, view)),
+            events: view.events[from..].to_vec(),
+        }
+    }
+
+    /// True if what is told is of the past: the graph has ended, or nobody says anything.
+    pub fn is_past(&self) -> bool {
+        let silent = self.services.iter().all(|service| !service.is_well());
+        self.state == GraphState::Ended || self.state == GraphState::Stale && silent
+    }
+
+    /// The state in words, and that nobody looks after the graph.
+    pub fn state_text(&self) -> String {
+        let is_said = [GraphState::Unsupervised, GraphState::Ended].contains(&self.state);
+        match self.launcher.is_none() && !is_said {
+            true => format!("{}, UNSUPERVISED", self.state.word()),
+            false => self.state.word().to_owned(),
+        }
+    }
+
+    /// Faults as people look after them: those that are present first, what is over last.
+    pub fn faults_in_order(&self) -> Vec<&NamedFault> {
+        let rank = |fault: &&NamedFault| match fault.state {
+            "active" => 0,
+            "acknowledged" => 1,
+            "latched" => 2,
+            "pending" => 3,
+            _ => 4,
+        };
+        let mut faults: Vec<&NamedFault> = self.faults.iter().collect();
+        faults.sort_by_key(rank);
+        faults
+    }
+}
+
+/// That the supervisor is silent, and for how long.
+fn silence(view: &View, age_s: impl Fn(u64) -> f64) -> String {
+    let heard = view.action.as_ref().map(|block| block.header.t_publish_ns);
+    let faults = view.faults.as_ref().map(|block| block.header.t_publish_ns);
+    let who = match view.newest_ns() {
+        Some(newest_ns) if age_s(newest_ns) <= STALE_S => "the supervisor has",
+        _ => "all services have",
+    };
+    heard.max(faults).map_or_else(
+        || "the supervisor has said nothing yet".to_owned(),
+        |at_ns| format!("{who} been silent for {:.1} s", age_s(at_ns)),
+    )
+}

@@ -1,0 +1,107 @@
+//! `vigil top`: a running graph, live in the terminal.
+
+mod belief;
+mod chart;
+mod clipped;
+mod events;
+mod faults;
+mod frame;
+mod head;
+mod help;
+mod line;
+mod palette;
+mod screen;
+mod services;
+
+use std::io::IsTerminal;
+
+use vigil_cycle::signal;
+use vigil_setup::RunningArgs;
+use vigil_terminal::{CommandError, Outcome, output};
+
+use crate::faults::document::Now;
+use crate::status::Document;
+use crate::watch::{POLL, Watch};
+use frame::Scene;
+use palette::Palette;
+
+/// Looks between two lines: one a second.
+const LOOKS: u32 = 20;
+
+/// Shows a running graph live: faults and why, beliefs, the decision, services, times, events.
+///
+/// It only looks. Keys: q ends it, ? explains, arrows scroll the events. Without a terminal it
+/// prints a line a second. NO_COLOR is honoured.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    running: RunningArgs,
+    /// Print one line a second, until Ctrl-C or the end of the graph.
+    #[arg(long)]
+    line: bool,
+    /// Print one picture of 80 columns and 24 lines as text, and end.
+    #[arg(long, conflicts_with = "line")]
+    once: bool,
+    /// With --once: print the JSON document of `vigil status` instead.
+    #[arg(long, requires = "once")]
+    json: bool,
+}
+
+/// Shows the graph.
+///
+/// # Errors
+/// A graph that does not run; the transport's; a terminal that cannot be drawn to.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let mut watch = Watch::join(&args.running)?;
+    if args.once {
+        watch.first_look();
+        return print_once(args, &watch);
+    }
+    signal::install();
+    let is_plain = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
+    match args.line || is_plain || !std::io::stdout().is_terminal() {
+        true => print_lines(&mut watch),
+        false => screen::run(
+            &mut watch,
+            Palette::new(std::env::var_os("NO_COLOR").as_deref()),
+        ),
+    }
+    .map_err(CommandError::failure)?;
+    Ok(Outcome::Done)
+}
+
+fn document(watch: &Watch) -> Document {
+    Document::new(&watch.view, watch.setup(), Now::new())
+}
+
+fn print_once(args: &Args, watch: &Watch) -> Result<Outcome, CommandError> {
+    let document = document(watch);
+    let printed = match args.json {
+        true => output::json(&document),
+        false => output::line(&frame::text(&Scene::new(
+            &document,
+            &watch.view,
+            Palette::PLAIN,
+        ))),
+    };
+    printed.map_err(CommandError::failure)?;
+    Ok(Outcome::Done)
+}
+
+fn print_lines(watch: &mut Watch) -> std::io::Result<()> {
+    watch.first_look();
+    while !signal::stop_requested() {
+        output::line(&line::text(&document(watch)))?;
+        if watch.view.has_ended {
+            eprintln!("the graph has ended");
+            break;
+        }
+        for _ in 0..LOOKS {
+            if !signal::stop_requested() {
+                std::thread::sleep(POLL);
+                watch.look();
+            }
+        }
+    }
+    Ok(())
+}
