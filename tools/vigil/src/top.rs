@@ -6,6 +6,8 @@ mod clipped;
 mod events;
 mod faults;
 mod frame;
+#[cfg(test)]
+mod frame_tests;
 mod head;
 mod help;
 mod line;
@@ -53,11 +55,11 @@ pub struct Args {
 /// A graph that does not run; the transport's; a terminal that cannot be drawn to.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let mut watch = Watch::join(&args.running)?;
+    signal::install();
+    watch.first_look();
     if args.once {
-        watch.first_look();
         return print_once(args, &watch);
     }
-    signal::install();
     let is_plain = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
     match args.line || is_plain || !std::io::stdout().is_terminal() {
         true => print_lines(&mut watch),
@@ -89,7 +91,6 @@ fn print_once(args: &Args, watch: &Watch) -> Result<Outcome, CommandError> {
 }
 
 fn print_lines(watch: &mut Watch) -> std::io::Result<()> {
-    watch.first_look();
     while !signal::stop_requested() {
         output::line(&line::text(&document(watch)))?;
         if watch.view.has_ended {

@@ -4,6 +4,8 @@
 mod end_to_end;
 mod event_log;
 mod history;
+#[cfg(test)]
+pub mod sample;
 mod topics;
 mod view;
 

@@ -82,7 +82,7 @@ impl Detector {
         let count = self.alarm_count;
         match (self.blind, self.alarm, self.readiness) {
             (Some(cause), ..) => format!("BLIND: {cause}"),
-            (None, true, _) => format!("ALARM, the {count}. so far"),
+            (None, true, _) => format!("ALARM, alarms so far {count}"),
             (None, false, "not-excited") => "robot stands: belief held".to_owned(),
             (None, false, readiness) => format!("{readiness}, alarms so far {count}"),
         }

@@ -158,3 +158,85 @@ fn silence(view: &View, age_s: impl Fn(u64) -> f64) -> String {
         |at_ns| format!("{who} been silent for {:.1} s", age_s(at_ns)),
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::watch::sample::{self, NOW, setup};
+
+    #[test]
+    fn state_is_of_the_faults_unless_nobody_says_them_or_nobody_looks_after_the_graph() {
+        let setup = setup();
+        let of = |view: &View| {
+            let document = Document::new(view, &setup, NOW);
+            (document.state, document.state_text(), document.is_past())
+        };
+        let mut view = sample::healthy(&setup);
+        assert_eq!(of(&view), (GraphState::Ok, "OK".to_owned(), false));
+        view.launcher = None;
+        let unsupervised = "UNSUPERVISED".to_owned();
+        assert_eq!(of(&view), (GraphState::Unsupervised, unsupervised, false));
+        let mut faulty = sample::faulty(&setup);
+        assert_eq!(of(&faulty), (GraphState::Fault, "FAULT".to_owned(), false));
+        faulty.launcher = None;
+        assert_eq!(of(&faulty).1, "FAULT, UNSUPERVISED");
+        let silent = sample::silent(&setup);
+        let stale = "STALE, UNSUPERVISED".to_owned();
+        assert_eq!(of(&silent), (GraphState::Stale, stale, true));
+        faulty.has_ended = true;
+        assert_eq!(of(&faulty), (GraphState::Ended, "ENDED".to_owned(), true));
+    }
+
+    #[test]
+    fn a_supervisor_alone_that_is_silent_is_told_and_the_rest_is_of_the_present() {
+        let setup = setup();
+        let mut view = sample::healthy(&setup);
+        let silent = sample::silent(&setup);
+        (view.faults, view.action) = (silent.faults, silent.action);
+        let document = Document::new(&view, &setup, NOW);
+        assert_eq!(document.state, GraphState::Stale);
+        assert!(!document.is_past());
+        let because = document.unknown_because.unwrap();
+        assert_eq!(because, "the supervisor has been silent for 5.0 s");
+        // Of another tree, names would be wrong.
+        let mut view = sample::faulty(&setup);
+        view.faults.as_mut().unwrap().tree_hash = 1;
+        let document = Document::new(&view, &setup, NOW);
+        assert_eq!(
+            (document.state, document.faults),
+            (GraphState::Stale, vec![])
+        );
+    }
+
+    #[test]
+    fn a_frame_without_a_channel_and_refused_frames_are_told_by_cause() {
+        let setup = setup();
+        let mut view = sample::healthy(&setup);
+        let frame = view.frame.as_mut().unwrap();
+        frame.channel_valid &= !1;
+        let sensor = view.health[0].as_mut().unwrap();
+        sensor.rejected[vigil_blocks::Rejection::Corrupt as usize] = 3;
+        let input = Document::new(&view, &setup, NOW).input.unwrap();
+        assert_eq!(
+            input.text(),
+            "12 of 13 channels valid; MISSING x; REJECTED 3 corrupt"
+        );
+        assert!(input.is_wrong());
+    }
+
+    #[test]
+    fn a_program_finds_each_part_under_its_name() {
+        let setup = setup();
+        let document = Document::new(&sample::faulty(&setup), &setup, NOW);
+        let json = serde_json::to_value(&document).unwrap();
+        assert_eq!(json["schema_version"], 1);
+        assert_eq!(json["state"], "fault");
+        assert_eq!(json["faults"][0]["name"], "RM_STUCK");
+        assert_eq!(json["diagnosis"]["nodes"][0]["p"], 0.998);
+        assert_eq!(json["decision"]["weighing"]["second"]["action"], "go_on");
+        assert_eq!(json["services"][2]["health"]["missed"], 1);
+        assert_eq!(json["end_to_end"]["rate_hz"], 100.0);
+        assert_eq!(json["input"]["valid"], 13);
+        assert_eq!(json["events"][1]["event"], "alarm");
+    }
+}

@@ -132,12 +132,58 @@ pub fn percent_text(times: &Percentiles) -> String {
         window_s,
         ..
     } = times;
-    format!("to action us: p50 {p50:.0} p90 {p90:.0} p99 {p99:.0} max {max:.0} in {window_s:.1} s")
+    format!(
+        "schedule to action p50 {p50:.0}  p90 {p90:.0}  p99 {p99:.0}  max {max:.0} us  \
+         ({window_s:.1} s)"
+    )
 }
 
 fn shortened(line: &str) -> String {
     match line.char_indices().nth(COLUMNS) {
         None => line.to_owned(),
         Some(_) => line.chars().take(COLUMNS - 1).chain(['…']).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::watch::sample::{self, NOW, setup};
+
+    #[test]
+    fn a_fault_is_told_with_why_and_what_is_done_in_80_columns_and_24_lines() {
+        let setup = setup();
+        let text = text(&Document::new(&sample::faulty(&setup), &setup, NOW));
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(
+            lines[..7],
+            [
+                "rover: FAULT, 100 Hz, up 1 min 2 s, launcher 4711",
+                "faults     RM_STUCK active since 3 min, 2 times, p 0.998, compensate",
+                "             stuck; wheel rate RM says so by 5.4 nat, against RM_ENC",
+                "detector   p(fault) 0.998; ALARM, alarms so far 1",
+                "diagnosis  RM_STUCK; RM_STUCK 0.998  ND 0.001  UNKNOWN 0.001  LF_STUCK 0.000",
+                "decision   compensate; earns 1.50; go_on would earn 4.50 less",
+                "           STUCK 0.750  UNKNOWN 0.250  ND 0.000",
+            ]
+        );
+        let time = "time       schedule to action p50 250  p90 290  p99 299  max 300 us  (10.0 s)";
+        assert!(lines.contains(&time), "{text}");
+        assert!(lines.len() <= 24, "{text}");
+        assert!(
+            lines.iter().all(|line| line.chars().count() <= 80),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn who_looks_after_a_graph_without_a_launcher_is_told() {
+        let setup = setup();
+        let mut view = sample::healthy(&setup);
+        view.launcher = None;
+        let text = text(&Document::new(&view, &setup, NOW));
+        assert!(text.starts_with("rover: UNSUPERVISED, 100 Hz"), "{text}");
+        assert!(text.contains("`vigil run --adopt --graph rover` takes over"));
+        assert!(text.contains("\nfaults     no faults\n"), "{text}");
     }
 }

@@ -14,7 +14,7 @@ use crate::watch::History;
 const BEFORE: usize = 30;
 /// Columns after the curves at least.
 const AFTER: usize = 15;
-/// What was at most so probable within the last minute stays behind what is more so now.
+/// What was never more probable within the last minute is not told; nearer ones are not told apart.
 const P_TOLD: f64 = 0.005;
 
 /// A probability with its name.
@@ -73,6 +73,7 @@ fn bars<'a>(diagnosis: &'a Diagnosis, scene: &'a Scene<'_>, room: usize) -> Vec<
     let recent = |bar: &Bar<'_>| bar.history.and_then(History::largest).unwrap_or(bar.p);
     // By what can be seen, so that rows do not change places for nothing.
     let order = |bar: &Bar<'_>| [bar.p, recent(bar)].map(|p| (p / P_TOLD).round() as i64);
+    bars.retain(|bar| recent(bar) >= P_TOLD);
     bars.sort_by_key(|bar| std::cmp::Reverse(order(bar)));
     bars.truncate(room.saturating_sub(2));
     bars.push(Bar {

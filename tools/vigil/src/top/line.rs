@@ -41,3 +41,29 @@ pub fn text(document: &Document) -> String {
     parts.extend(unwell.map(|it| format!("{} {}", it.name, it.state.to_uppercase())));
     parts.join(" | ")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::watch::sample::{self, NOW, setup};
+
+    #[test]
+    fn a_line_says_state_fault_action_and_time() {
+        let setup = setup();
+        let line = |view| text(&Document::new(&view, &setup, NOW));
+        let faulty = line(sample::faulty(&setup));
+        let (_, rest) = faulty.split_once("  ").unwrap();
+        assert_eq!(
+            rest,
+            "rover  FAULT | RM_STUCK active p 0.998 | p(fault) 0.998 | compensate | \
+             100.0 Hz, p99 299 us | missed 1"
+        );
+        let silent = line(sample::silent(&setup));
+        assert!(silent.contains("STALE, UNSUPERVISED"), "{silent}");
+        assert!(
+            silent.contains("all services have been silent for 5.0 s"),
+            "{silent}"
+        );
+        assert!(silent.ends_with("supervisor GONE"), "{silent}");
+    }
+}

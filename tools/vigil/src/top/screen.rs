@@ -1,6 +1,6 @@
 //! The terminal: drawn ten times a second, given back on every way out.
 
-use std::io;
+use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
 
 use crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
@@ -87,19 +87,28 @@ pub fn run(watch: &mut Watch, palette: Palette) -> io::Result<()> {
             };
             screen.terminal.draw(draw)?;
         }
-        // The wait between two looks; a key ends it.
-        if event::poll(POLL)? {
-            match event::read()? {
-                Event::Key(key) if key.kind != KeyEventKind::Release => {
-                    look.press(key, watch.view.events.len());
-                    drawn = None;
-                }
-                Event::Resize(..) => drawn = None,
-                _ => {}
+        match next_event()? {
+            Some(Event::Key(key)) if key.kind != KeyEventKind::Release => {
+                look.press(key, watch.view.events.len());
+                drawn = None;
             }
+            Some(Event::Resize(..)) => drawn = None,
+            _ => {}
         }
     }
     Ok(())
+}
+
+/// The wait between two looks: a key ends it, and a signal, which is no error.
+fn next_event() -> io::Result<Option<Event>> {
+    let next = || match event::poll(POLL)? {
+        true => event::read().map(Some),
+        false => Ok(None),
+    };
+    match next() {
+        Err(error) if error.kind() == ErrorKind::Interrupted => Ok(None),
+        next => next,
+    }
 }
 
 #[cfg(test)]

@@ -9,14 +9,14 @@ use super::palette::Palette;
 use crate::status::{Document, Service, percent_text};
 
 /// Columns before the curve.
-const BEFORE: usize = 67;
+const BEFORE: usize = 71;
 
 /// A line of titles, and one for each service.
 pub fn lines(scene: &Scene<'_>, width: usize) -> Vec<Line<'static>> {
     let palette = scene.palette;
-    let columns = width.saturating_sub(BEFORE + 1).min(60);
+    let columns = width.saturating_sub(BEFORE).min(60);
     let titles = format!(
-        "{:<11}{:<9}{:>6}{:>6}{:>6}{:>7}{:>5} {:<8}{:<9}{}",
+        "{:<11}{:<9}{:>5}{:>6}{:>7}{:>7}{:>5} {:<8} {:<11}{}",
         "services", "", "us", "worst", "budget", "missed", "over", "lo/la/re", "core", "us, 60 s"
     );
     let mut lines = vec![Line::styled(clipped(&titles, width), palette.title())];
@@ -50,12 +50,12 @@ fn line(service: &Service, palette: Palette) -> Line<'static> {
             0 => palette.healthy(),
             _ => palette.warning(),
         };
-        spans.push(Span::raw(format!("{last:>6.0}{worst:>6.0}{budget:>6.0}")));
+        spans.push(Span::raw(format!("{last:>5.0}{worst:>6.0}{budget:>7.0}")));
         spans.push(Span::styled(
-            format!("{:>7}{:>5} {refused:<8}", of.missed, of.over_budget),
+            format!("{:>7}{:>5} {refused:<8} ", of.missed, of.over_budget),
             style,
         ));
-        spans.push(Span::raw(format!("{place:<9}")));
+        spans.push(Span::raw(format!("{place:<11}")));
     }
     Line::from(spans)
 }
