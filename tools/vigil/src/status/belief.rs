@@ -19,6 +19,8 @@ pub struct Detector {
     pub readiness: &'static str,
     /// Why it sees nothing; null while it sees.
     pub blind: Option<&'static str>,
+    /// Since it said so.
+    pub age_s: f64,
 }
 
 /// The identifier's belief.
@@ -62,7 +64,8 @@ pub struct NamedSet {
 
 impl Detector {
     /// A block in words.
-    pub fn new(block: &DetectionBelief) -> Self {
+    pub fn new(block: &DetectionBelief, now_ns: u64) -> Self {
+        let age_ns = now_ns.saturating_sub(block.header.t_publish_ns);
         Self {
             p_fault: block.p_fault,
             alarm: block.alarm != 0,
@@ -74,12 +77,21 @@ impl Detector {
                 None => "?",
             },
             blind: Blindness::from_repr(block.blind).map(Blindness::as_str),
+            age_s: (age_ns as f64 * 1e-6).round() * 1e-3,
         }
+    }
+
+    /// True if it has said nothing for a second.
+    pub fn is_silent(&self) -> bool {
+        self.age_s > 1.0
     }
 
     /// Whether an alarm stands or could rise, for people.
     pub fn text(&self) -> String {
         let count = self.alarm_count;
+        if self.is_silent() {
+            return format!("SILENT for {:.1} s", self.age_s);
+        }
         match (self.blind, self.alarm, self.readiness) {
             (Some(cause), ..) => format!("BLIND: {cause}"),
             (None, true, _) => format!("ALARM, alarms so far {count}"),

@@ -13,6 +13,8 @@ const STATES: usize = 3;
 pub struct Decision {
     /// The action, with the wheels that it is about.
     pub action: String,
+    /// True once the robot must no longer obey it.
+    pub has_expired: bool,
     /// How it was chosen: `policy`, `dual`, `fallback` or `safe`.
     pub chosen_by: &'static str,
     /// What the policy thinks of it, in the measure of `weighing`.
@@ -29,7 +31,7 @@ pub struct Decision {
 
 impl Decision {
     /// A block with the names that the decision model gives.
-    pub fn new(block: &Action, setup: &Setup) -> Self {
+    pub fn new(block: &Action, setup: &Setup, now_ns: u64) -> Self {
         let (states, actions) = (setup.decision.states(), setup.decision.actions());
         let at = block.action as usize;
         let action = actions.get(at).map_or("?", String::as_str);
@@ -46,6 +48,7 @@ impl Decision {
         named.truncate(STATES);
         Self {
             action: setup.robot.action_text(action, block.answered()),
+            has_expired: block.valid_until_ns < now_ns,
             chosen_by: chosen_by(block.control_mode),
             value: block.value.get(at).copied().unwrap_or_default(),
             weighing: weighing.map(|it| NamedWeighing::new(&it, states, actions)),
@@ -53,6 +56,16 @@ impl Decision {
             speed_scale: block.speed_scale,
             decision_count: block.decision_seq,
         }
+    }
+
+    /// The action, and whether it holds, for people.
+    pub fn action_text(&self) -> String {
+        let chosen = match self.chosen_by {
+            "policy" => String::new(),
+            by => format!(" (by {})", by.to_uppercase()),
+        };
+        let expired = if self.has_expired { " EXPIRED" } else { "" };
+        format!("{}{chosen}{expired}", self.action)
     }
 
     /// What the action is worth, and why the second best lost, for people.

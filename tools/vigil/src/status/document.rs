@@ -14,7 +14,7 @@ use crate::faults::document::{self as faults, NamedFault, Now};
 use crate::watch::{Percentiles, View};
 
 /// Without a block for so long nothing is known.
-const STALE_S: f64 = 1.0;
+pub const STALE_S: f64 = 1.0;
 /// Newest events that are told.
 const EVENTS: usize = 20;
 
@@ -68,7 +68,10 @@ impl Document {
             block.tree_hash == setup.tree.hash()
         });
         let faults = faults.map(|block| faults::Document::at(block, setup, now));
-        let detector = view.detection.as_ref().map(|block| Detector::new(block));
+        let detector = view
+            .detection
+            .as_ref()
+            .map(|block| Detector::new(block, now_ns));
         let state = match view.has_ended {
             true => GraphState::Ended,
             false => GraphState::new(overall, view.launcher.is_some()),
@@ -104,9 +107,9 @@ impl Document {
             decision: view
                 .action
                 .as_ref()
-                .map(|block| Decision::new(block, setup)),
+                .map(|block| Decision::new(block, setup, now_ns)),
             services: Service::all(view, now_ns),
-            end_to_end: view.end_to_end.percentiles(),
+            end_to_end: view.end_to_end.percentiles(now_ns),
             input: view
                 .frame
                 .as_ref()
@@ -119,6 +122,13 @@ impl Document {
     pub fn is_past(&self) -> bool {
         let silent = self.services.iter().all(|service| !service.is_well());
         self.state == GraphState::Ended || self.state == GraphState::Stale && silent
+    }
+
+    /// Actions a second, at present.
+    pub fn present_rate_hz(&self) -> f64 {
+        let times = self.end_to_end.as_ref();
+        let times = times.filter(|times| times.age_s <= STALE_S);
+        times.map_or(0.0, |times| times.rate_hz)
     }
 
     /// The state in words, and that nobody looks after the graph.
@@ -147,14 +157,16 @@ impl Document {
 
 /// That the supervisor is silent, and for how long.
 fn silence(view: &View, age_s: impl Fn(u64) -> f64) -> String {
-    let heard = view.action.as_ref().map(|block| block.header.t_publish_ns);
+    let action = view.action.as_ref().map(|block| block.header.t_publish_ns);
     let faults = view.faults.as_ref().map(|block| block.header.t_publish_ns);
+    // What was kept in the file was never sent.
+    let heard = action.max(faults).filter(|at_ns| *at_ns > 0);
     let who = match view.newest_ns() {
         Some(newest_ns) if age_s(newest_ns) <= STALE_S => "the supervisor has",
         _ => "all services have",
     };
-    heard.max(faults).map_or_else(
-        || "the supervisor has said nothing yet".to_owned(),
+    heard.map_or_else(
+        || "the supervisor says nothing".to_owned(),
         |at_ns| format!("{who} been silent for {:.1} s", age_s(at_ns)),
     )
 }

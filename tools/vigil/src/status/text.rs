@@ -1,6 +1,6 @@
 //! A status for people: at most 80 columns, at most 24 lines for a robot with few faults.
 
-use super::document::Document;
+use super::document::{Document, STALE_S};
 use super::service::Service;
 use crate::faults::document::NamedFault;
 use crate::faults::table::{ago, why};
@@ -42,7 +42,7 @@ pub fn text(document: &Document) -> String {
         lines.push(format!("diagnosis  {mode}; {}", told.join("  ")));
     }
     if let Some(decision) = &document.decision {
-        let (action, why) = (&decision.action, decision.why());
+        let (action, why) = (decision.action_text(), decision.why());
         lines.push(format!("decision   {action}; {why}"));
         lines.push(format!("           {}", decision.states_text()));
     }
@@ -130,11 +130,16 @@ pub fn percent_text(times: &Percentiles) -> String {
         latency_us_p99: p99,
         latency_us_max: max,
         window_s,
+        age_s,
         ..
     } = times;
+    let ended = match *age_s > STALE_S {
+        true => format!(", until {age_s:.0} s ago"),
+        false => String::new(),
+    };
     format!(
         "schedule to action p50 {p50:.0}  p90 {p90:.0}  p99 {p99:.0}  max {max:.0} us  \
-         ({window_s:.1} s)"
+         ({window_s:.1} s{ended})"
     )
 }
 

@@ -15,7 +15,7 @@ const BEFORE: usize = 30;
 /// Columns after the curves at least.
 const AFTER: usize = 15;
 /// What was never more probable within the last minute is not told; nearer ones are not told apart.
-const P_TOLD: f64 = 0.005;
+const P_TOLD: f64 = 0.01;
 
 /// A probability with its name.
 struct Bar<'a> {
@@ -32,6 +32,7 @@ pub fn lines(scene: &Scene<'_>, rows: usize, width: usize) -> Vec<Line<'static>>
     if let Some(detector) = &document.detector {
         let count = detector.alarm_count;
         let (style, text) = match (detector.alarm, detector.readiness) {
+            _ if detector.is_silent() => (palette.wrong(), "SILENT".to_owned()),
             (true, _) => (palette.wrong(), format!("ALARM ({count})")),
             (false, readiness) => (palette.healthy(), format!("{readiness} ({count})")),
         };
@@ -62,6 +63,9 @@ pub fn lines(scene: &Scene<'_>, rows: usize, width: usize) -> Vec<Line<'static>>
 fn bars<'a>(diagnosis: &'a Diagnosis, scene: &'a Scene<'_>, room: usize) -> Vec<Bar<'a>> {
     let (histories, palette) = (scene.histories, scene.palette);
     let leaves = diagnosis.nodes.iter().filter(|node| node.is_leaf);
+    let mut leaves: Vec<_> = leaves.collect();
+    leaves.sort_by_key(|node| node.at);
+    let leaves = leaves.into_iter();
     let mut bars: Vec<Bar<'a>> = leaves
         .map(|node| Bar {
             name: &node.name,
@@ -71,7 +75,7 @@ fn bars<'a>(diagnosis: &'a Diagnosis, scene: &'a Scene<'_>, room: usize) -> Vec<
         })
         .collect();
     let recent = |bar: &Bar<'_>| bar.history.and_then(History::largest).unwrap_or(bar.p);
-    // By what can be seen, so that rows do not change places for nothing.
+    // By what can be seen, then by place, so that rows do not change places for nothing.
     let order = |bar: &Bar<'_>| [bar.p, recent(bar)].map(|p| (p / P_TOLD).round() as i64);
     bars.retain(|bar| recent(bar) >= P_TOLD);
     bars.sort_by_key(|bar| std::cmp::Reverse(order(bar)));
@@ -113,16 +117,16 @@ fn line(of: &Bar<'_>, title: &'static str, scene: &Scene<'_>, width: usize) -> L
 /// The decision in two lines.
 pub fn decision(decision: &Decision, width: usize, palette: Palette) -> Vec<Line<'static>> {
     let why = decision.why();
-    let chosen = match decision.chosen_by {
-        "policy" => String::new(),
-        by => format!(" (by {})", by.to_uppercase()),
+    let action = decision.action_text();
+    let style = match decision.has_expired {
+        true => palette.wrong(),
+        false => palette.title(),
     };
-    let action = format!("{}{chosen}", decision.action);
     let room = width.saturating_sub(12 + action.chars().count());
     vec![
         Line::from(vec![
             Span::styled("decision  ", palette.title()),
-            Span::styled(action, palette.title()),
+            Span::styled(action, style),
             Span::raw(format!("  {}", clipped(&why, room))),
         ]),
         Line::raw(clipped(

@@ -161,6 +161,9 @@ fn what_is_stale_says_so_and_is_grey() {
         rows.iter().any(|row| row.starts_with("detector   GONE")),
         "{rows:#?}"
     );
+    let expired = "decision  compensate EXPIRED  earns 1.50; go_on would earn 4.50 less";
+    assert!(rows.iter().any(|row| row == expired), "{rows:#?}");
+    assert!(rows[4].ends_with("SILENT"), "{}", rows[4]);
     let grey = (2..24).all(|y| (0..80).all(|x| buffer[(x, y)].fg == Color::Indexed(245)));
     assert!(grey, "the past is grey, whatever it was");
     assert_eq!(colour(&buffer, "STALE"), Color::Indexed(166));

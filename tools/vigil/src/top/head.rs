@@ -11,10 +11,7 @@ use crate::status::{Document, GraphState};
 /// The first line, and a second one if there is more to say.
 pub fn lines(document: &Document, width: usize, palette: Palette) -> Vec<Line<'static>> {
     let up = document.up_s.map_or("?".to_owned(), duration_text);
-    let rate_hz = match &document.end_to_end {
-        Some(times) => times.rate_hz,
-        None => document.rate_hz,
-    };
+    let rate_hz = document.present_rate_hz();
     let state = document.state_text();
     let name = format!("vigil  {}  ", document.graph);
     let rest = format!("  {rate_hz:.1} Hz  up {up}");

@@ -28,10 +28,10 @@ pub fn text(document: &Document) -> String {
         parts.push(format!("p(fault) {:.3}", detector.p_fault));
     }
     if let Some(decision) = &document.decision {
-        parts.push(decision.action.clone());
+        parts.push(decision.action_text());
     }
     if let Some(times) = &document.end_to_end {
-        let (rate_hz, p99) = (times.rate_hz, times.latency_us_p99);
+        let (rate_hz, p99) = (document.present_rate_hz(), times.latency_us_p99);
         parts.push(format!("{rate_hz:.1} Hz, p99 {p99:.0} us"));
     }
     let health = || document.services.iter().filter_map(|it| it.health.as_ref());

@@ -22,6 +22,8 @@ pub struct EndToEnd {
 pub struct Percentiles {
     /// From the first of the actions to the last.
     pub window_s: f64,
+    /// Since the last one.
+    pub age_s: f64,
     /// Actions that were read.
     pub count: u64,
     /// Actions that were sent meanwhile: at high rates not every one is read.
@@ -55,8 +57,8 @@ impl EndToEnd {
         }
     }
 
-    /// The distribution; `None` before the second action.
-    pub fn percentiles(&self) -> Option<Percentiles> {
+    /// The distribution as of `now_ns`; `None` before the second action.
+    pub fn percentiles(&self, now_ns: u64) -> Option<Percentiles> {
         let (first, last) = (self.actions.front()?, self.actions.back()?);
         let window_ns = last.t_publish_ns.saturating_sub(first.t_publish_ns);
         if window_ns == 0 {
@@ -70,9 +72,11 @@ impl EndToEnd {
         let us = |ns: u64| (ns as f64 / 100.0).round() / 10.0;
         let at = |quantile| us(times.value_at_quantile(quantile));
         let window_s = window_ns as f64 * 1e-9;
+        let age_s = now_ns.saturating_sub(last.t_publish_ns) as f64 * 1e-9;
         let steps = last.seq.saturating_sub(first.seq);
         Some(Percentiles {
             window_s: (window_s * 10.0).round() / 10.0,
+            age_s: (age_s * 10.0).round() / 10.0,
             count: self.actions.len() as u64,
             sent: steps + 1,
             rate_hz: (steps as f64 / window_s * 10.0).round() / 10.0,
@@ -87,6 +91,9 @@ impl EndToEnd {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Four seconds after the last action of the first test.
+    const NOW_NS: u64 = 27_000_000_000;
 
     fn action(seq: u64, latency_ns: u64) -> Header {
         let t_schedule_ns = 1_000_000_000 + seq * 10_000_000;
@@ -103,12 +110,13 @@ mod tests {
     fn percentiles_are_of_the_last_ten_seconds_and_of_one_writer() {
         let mut times = EndToEnd::default();
         times.push(action(0, 900_000_000));
-        assert_eq!(times.percentiles(), None);
+        assert_eq!(times.percentiles(NOW_NS), None);
         (200..=2200).for_each(|seq| times.push(action(seq, 400_000 + seq * 100)));
-        let found = times.percentiles().unwrap();
+        let found = times.percentiles(NOW_NS).unwrap();
         // The first ones are older than ten seconds.
         assert_eq!((found.count, found.sent), (1000, 1000));
         assert_eq!((found.window_s, found.rate_hz), (10.0, 100.0));
+        assert_eq!(found.age_s, 4.0);
         let p50 = found.latency_us_p50;
         assert!((p50 - 570.0).abs() < 2.0, "{p50}");
         assert!((found.latency_us_max - 620.0).abs() < 1.0, "{found:?}");
@@ -116,14 +124,14 @@ mod tests {
             epoch: 8,
             ..action(2201, 1)
         });
-        assert_eq!(times.percentiles(), None);
+        assert_eq!(times.percentiles(NOW_NS), None);
     }
 
     #[test]
     fn actions_that_were_not_read_are_counted() {
         let mut times = EndToEnd::default();
         (0..100).for_each(|seq| times.push(action(seq * 3, 1_000)));
-        let found = times.percentiles().unwrap();
+        let found = times.percentiles(NOW_NS).unwrap();
         assert_eq!((found.count, found.sent), (100, 298));
         assert_eq!(found.rate_hz, 100.0);
     }

@@ -79,6 +79,7 @@ pub fn silent(setup: &Setup) -> View {
     for health in view.health.iter_mut().flatten() {
         health.header.t_publish_ns = earlier_ns;
     }
+    view.action.as_mut().unwrap().valid_until_ns = earlier_ns;
     for header in [
         view.faults.as_mut().map(|block| block.header_mut()),
         view.frame.as_mut().map(|block| block.header_mut()),
@@ -214,6 +215,7 @@ fn action(setup: &Setup, action: &str, state: &str, second: &str) -> Action {
         action_count: actions.len() as u32,
         action: place(actions, action) as u32,
         control_mode: 1,
+        valid_until_ns: NOW_NS + 20_000_000,
         value_kind: ValueKind::Value as u32,
         value: [-90.0; vigil_blocks::DECISION_ACTIONS],
         ..Action::default()
