@@ -12,6 +12,7 @@ mod head;
 mod help;
 mod line;
 mod palette;
+mod scene;
 mod screen;
 mod services;
 
@@ -24,8 +25,8 @@ use vigil_terminal::{CommandError, Outcome, output};
 use crate::faults::document::Now;
 use crate::status::Document;
 use crate::watch::{POLL, Watch};
-use frame::Scene;
 use palette::Palette;
+use scene::Scene;
 
 /// Looks between two lines: one a second.
 const LOOKS: u32 = 20;

@@ -4,6 +4,8 @@ use serde::Serialize;
 use vigil_blocks::{Blindness, DetectionBelief, FaultBelief, FaultSet, Readiness};
 use vigil_robot::FaultTree;
 
+use crate::faults::document::Now;
+
 /// What is less probable is not listed.
 const P_MIN: f64 = 0.001;
 
@@ -21,6 +23,8 @@ pub struct Detector {
     pub blind: Option<&'static str>,
     /// Since it said so.
     pub age_s: f64,
+    /// True if that is too long for a detector that lives.
+    pub is_silent: bool,
 }
 
 /// The identifier's belief.
@@ -64,8 +68,8 @@ pub struct NamedSet {
 
 impl Detector {
     /// A block in words.
-    pub fn new(block: &DetectionBelief, now_ns: u64) -> Self {
-        let age_ns = now_ns.saturating_sub(block.header.t_publish_ns);
+    pub fn new(block: &DetectionBelief, now: Now, silent_s: f64) -> Self {
+        let age_ns = now.monotonic_ns.saturating_sub(block.header.t_publish_ns);
         Self {
             p_fault: block.p_fault,
             alarm: block.alarm != 0,
@@ -77,19 +81,15 @@ impl Detector {
                 None => "?",
             },
             blind: Blindness::from_repr(block.blind).map(Blindness::as_str),
+            is_silent: age_ns as f64 * 1e-9 > silent_s,
             age_s: (age_ns as f64 * 1e-6).round() * 1e-3,
         }
-    }
-
-    /// True if it has said nothing for a second.
-    pub fn is_silent(&self) -> bool {
-        self.age_s > 1.0
     }
 
     /// Whether an alarm stands or could rise, for people.
     pub fn text(&self) -> String {
         let count = self.alarm_count;
-        if self.is_silent() {
+        if self.is_silent {
             return format!("SILENT for {:.1} s", self.age_s);
         }
         match (self.blind, self.alarm, self.readiness) {

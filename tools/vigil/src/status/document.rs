@@ -14,7 +14,7 @@ use crate::faults::document::{self as faults, NamedFault, Now};
 use crate::watch::{Percentiles, View};
 
 /// Without a block for so long nothing is known.
-pub const STALE_S: f64 = 1.0;
+const STALE_S: f64 = 1.0;
 /// Newest events that are told.
 const EVENTS: usize = 20;
 
@@ -68,10 +68,11 @@ impl Document {
             block.tree_hash == setup.tree.hash()
         });
         let faults = faults.map(|block| faults::Document::at(block, setup, now));
+        let silent_s = STALE_S.max(3.0 / setup.file.graph.rate_hz);
         let detector = view
             .detection
             .as_ref()
-            .map(|block| Detector::new(block, now_ns));
+            .map(|block| Detector::new(block, now, silent_s));
         let state = match view.has_ended {
             true => GraphState::Ended,
             false => GraphState::new(overall, view.launcher.is_some()),
@@ -127,7 +128,7 @@ impl Document {
     /// Actions a second, at present.
     pub fn present_rate_hz(&self) -> f64 {
         let times = self.end_to_end.as_ref();
-        let times = times.filter(|times| times.age_s <= STALE_S);
+        let times = times.filter(|times| !times.have_ended());
         times.map_or(0.0, |times| times.rate_hz)
     }
 

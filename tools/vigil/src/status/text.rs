@@ -1,6 +1,6 @@
 //! A status for people: at most 80 columns, at most 24 lines for a robot with few faults.
 
-use super::document::{Document, STALE_S};
+use super::document::Document;
 use super::service::Service;
 use crate::faults::document::NamedFault;
 use crate::faults::table::{ago, why};
@@ -133,7 +133,7 @@ pub fn percent_text(times: &Percentiles) -> String {
         age_s,
         ..
     } = times;
-    let ended = match *age_s > STALE_S {
+    let ended = match times.have_ended() {
         true => format!(", until {age_s:.0} s ago"),
         false => String::new(),
     };

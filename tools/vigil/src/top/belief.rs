@@ -5,8 +5,8 @@ use ratatui::text::{Line, Span};
 
 use super::chart::{bar, curve};
 use super::clipped::clipped;
-use super::frame::Scene;
 use super::palette::Palette;
+use super::scene::Scene;
 use crate::status::{Decision, Diagnosis};
 use crate::watch::History;
 
@@ -32,7 +32,7 @@ pub fn lines(scene: &Scene<'_>, rows: usize, width: usize) -> Vec<Line<'static>>
     if let Some(detector) = &document.detector {
         let count = detector.alarm_count;
         let (style, text) = match (detector.alarm, detector.readiness) {
-            _ if detector.is_silent() => (palette.wrong(), "SILENT".to_owned()),
+            _ if detector.is_silent => (palette.wrong(), "SILENT".to_owned()),
             (true, _) => (palette.wrong(), format!("ALARM ({count})")),
             (false, readiness) => (palette.healthy(), format!("{readiness} ({count})")),
         };

@@ -5,8 +5,8 @@ use ratatui::text::Line;
 use vigil_timeline::TimelineEntry;
 
 use super::clipped::clipped;
-use super::frame::Scene;
 use super::palette::Palette;
+use super::scene::Scene;
 
 /// A title and the newest events, the newest last, in at most so many lines.
 pub fn lines(scene: &Scene<'_>, rows: usize, width: usize) -> Vec<Line<'static>> {

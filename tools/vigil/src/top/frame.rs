@@ -3,14 +3,9 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::text::Line;
-use vigil_cycle::topic::ServiceName;
-use vigil_cycle::{Clock, Monotonic};
-use vigil_timeline::TimelineEntry;
 
-use super::palette::Palette;
+use super::scene::Scene;
 use super::{belief, events, faults, head, help, services};
-use crate::status::Document;
-use crate::watch::{Histories, History, View};
 
 /// Lines of the beliefs at least: detector, most probable leaf, unknown, nominal.
 const BELIEF_MIN: usize = 4;
@@ -20,41 +15,6 @@ const BELIEF_MAX: usize = 14;
 const EVENTS_MIN: usize = 4;
 /// The picture that is printed as text.
 const PRINTED: Rect = Rect::new(0, 0, 80, 24);
-
-/// What is drawn.
-#[derive(Debug, Clone, Copy)]
-pub struct Scene<'a> {
-    pub document: &'a Document,
-    pub histories: &'a Histories,
-    pub events: &'a [TimelineEntry],
-    pub palette: Palette,
-    pub now_ns: u64,
-    /// Events that are newer than the last one in the picture.
-    pub scroll: usize,
-    pub has_help: bool,
-}
-
-impl<'a> Scene<'a> {
-    /// Of the present.
-    pub fn new(document: &'a Document, view: &'a View, palette: Palette) -> Self {
-        Self {
-            document,
-            histories: &view.histories,
-            events: &view.events,
-            palette,
-            now_ns: Monotonic.now_ns(),
-            scroll: 0,
-            has_help: false,
-        }
-    }
-
-    /// The cycle times of a service.
-    pub fn history(&self, service: &str) -> Option<&'a History> {
-        let mut all = ServiceName::ALL.into_iter();
-        let found = all.find(|name| name.as_str() == service)?;
-        self.histories.cycle_us.get(found.index())
-    }
-}
 
 /// Draws the picture into an area.
 pub fn draw(scene: &Scene<'_>, area: Rect, buffer: &mut Buffer) {

@@ -5,8 +5,9 @@ use ratatui::backend::TestBackend;
 use ratatui::buffer::Buffer;
 use ratatui::style::Color;
 
-use super::frame::{Scene, draw, text};
+use super::frame::{draw, text};
 use super::palette::Palette;
+use super::scene::Scene;
 use crate::status::Document;
 use crate::watch::View;
 use crate::watch::sample::{self, NOW, NOW_NS, setup};

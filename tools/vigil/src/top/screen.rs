@@ -8,8 +8,9 @@ use ratatui::DefaultTerminal;
 use vigil_cycle::signal;
 
 use super::document;
-use super::frame::{self, Scene};
+use super::frame;
 use super::palette::Palette;
+use super::scene::Scene;
 use crate::watch::{POLL, Watch};
 
 /// Between two pictures.

@@ -4,8 +4,8 @@ use ratatui::text::{Line, Span};
 
 use super::chart::curve;
 use super::clipped::clipped;
-use super::frame::Scene;
 use super::palette::Palette;
+use super::scene::Scene;
 use crate::status::{Document, Service, percent_text};
 
 /// Columns before the curve.

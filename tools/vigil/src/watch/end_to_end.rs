@@ -40,6 +40,13 @@ pub struct Percentiles {
     pub latency_us_max: f64,
 }
 
+impl Percentiles {
+    /// True if no action comes any more: none for a second, and for three periods.
+    pub fn have_ended(&self) -> bool {
+        self.age_s > f64::max(1.0, 3.0 / self.rate_hz)
+    }
+}
+
 impl EndToEnd {
     /// Takes the header of an action.
     pub fn push(&mut self, header: Header) {

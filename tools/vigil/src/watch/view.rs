@@ -51,11 +51,14 @@ pub struct Histories {
 }
 
 impl View {
-    /// True once every topic has said something.
+    /// True once every topic has said something, of services those that live.
     pub fn is_complete(&self) -> bool {
         let stages = self.faults.is_some() && self.detection.is_some() && self.diagnosis.is_some();
         let ends = self.frame.is_some() && self.action.is_some();
-        stages && ends && self.health.iter().all(Option::is_some)
+        let mut services = self.health.iter().zip(&self.lives);
+        let is_heard =
+            |(health, lives): (&Option<_>, &Option<bool>)| health.is_some() || *lives != Some(true);
+        stages && ends && services.all(is_heard)
     }
 
     /// The instant of the newest block, ns; `None` before the first.
