@@ -16,7 +16,7 @@ mod scene;
 mod screen;
 mod services;
 
-use std::io::IsTerminal;
+use std::io::{self, IsTerminal, Write};
 
 use vigil_cycle::signal;
 use vigil_setup::RunningArgs;
@@ -62,7 +62,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         return print_once(args, &watch);
     }
     let is_plain = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
-    match args.line || is_plain || !std::io::stdout().is_terminal() {
+    match args.line || is_plain || !io::stdout().is_terminal() {
         true => print_lines(&mut watch),
         false => screen::run(
             &mut watch,
@@ -91,9 +91,11 @@ fn print_once(args: &Args, watch: &Watch) -> Result<Outcome, CommandError> {
     Ok(Outcome::Done)
 }
 
-fn print_lines(watch: &mut Watch) -> std::io::Result<()> {
+fn print_lines(watch: &mut Watch) -> io::Result<()> {
     while !signal::stop_requested() {
-        output::line(&line::text(&document(watch)))?;
+        if !is_read(&line::text(&document(watch)))? {
+            break;
+        }
         if watch.view.has_ended {
             eprintln!("the graph has ended");
             break;
@@ -106,4 +108,13 @@ fn print_lines(watch: &mut Watch) -> std::io::Result<()> {
         }
     }
     Ok(())
+}
+
+/// Prints a line; false once nobody reads it.
+fn is_read(line: &str) -> io::Result<bool> {
+    let mut out = io::stdout().lock();
+    match writeln!(out, "{line}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(false),
+        printed => printed.map(|()| true),
+    }
 }
