@@ -168,7 +168,7 @@ impl Drop for RunningGraph {
 }
 
 /// Waits for a child; a hanging one is killed and fails the test.
-fn wait(mut child: Child) -> Output {
+pub fn wait(mut child: Child) -> Output {
     let started = Instant::now();
     while matches!(child.try_wait(), Ok(None)) {
         if started.elapsed() > WATCHDOG {

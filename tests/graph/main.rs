@@ -10,6 +10,7 @@ mod built;
 mod corridor;
 mod external;
 mod faults;
+mod front_door;
 mod harness;
 mod identity;
 mod injection;

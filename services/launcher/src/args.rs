@@ -7,8 +7,8 @@ use vigil_setup::GraphArgs;
 
 /// Starts a graph, watches it, and prints what happened.
 ///
-/// It ends with Ctrl-C, or after --duration. Exit codes: 0 done, 1 the run had a failure, was blind,
-/// or saw no cycle, 2 a wrong option or configuration, and nothing was started.
+/// It ends with Ctrl-C, or after --duration. Exit codes: 0 done, 1 the run had a failure, was
+/// blind, or saw no cycle, 2 a wrong option or configuration, and nothing was started.
 #[derive(Debug, Clone, clap::Parser)]
 #[command(name = "vigil run", bin_name = "vigil run", version)]
 pub struct LauncherArgs {

@@ -24,3 +24,4 @@ mod watchdog;
 
 pub use args::LauncherArgs;
 pub use run::launch;
+pub use summary::Summary;

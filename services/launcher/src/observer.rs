@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::{Block, Health, REJECTIONS};
 use vigil_cycle::port::Link;
@@ -27,15 +28,23 @@ pub struct ServiceView {
 }
 
 /// Counters that add up over restarts.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, JsonSchema)]
 pub struct Counters {
+    /// Cycles that were computed.
     pub cycles: u64,
+    /// Scheduled instants whose deadline passed without output.
     pub missed: u64,
+    /// Cycles that took longer than their budget.
     pub over_budget: u64,
+    /// Scheduled instants that the source slept through.
     pub slips: u64,
+    /// Input blocks that never came.
     pub lost: u64,
+    /// Cycles whose input came after the deadline.
     pub late: u64,
+    /// Input blocks that came twice.
     pub duplicate: u64,
+    /// Input blocks that were refused.
     pub invalid: u64,
     /// Refused input by cause, see [`vigil_blocks::Rejection`]. The summary names the causes.
     #[serde(skip)]

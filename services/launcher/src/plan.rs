@@ -94,16 +94,16 @@ impl Plan {
             inject: args.inject.clone(),
             stamps: args.stamps.as_ref().map(stamps),
             no_timing: args.no_timing,
-            ..Self::of(&document, setup)?
+            ..Self::from_document(&document, setup)?
         })
     }
 
     /// What a running graph runs on, to look after it from now on.
     pub fn of_running(graph: &RunningGraph) -> Result<Self, LauncherError> {
-        Self::of(&graph.document, graph.setup.clone())
+        Self::from_document(&graph.document, graph.setup.clone())
     }
 
-    fn of(document: &Document, setup: Setup) -> Result<Self, LauncherError> {
+    fn from_document(document: &Document, setup: Setup) -> Result<Self, LauncherError> {
         let text = document.to_text()?;
         Ok(Self {
             document: SealedText::new(&text).map_err(LauncherError::Document)?,

@@ -92,7 +92,7 @@ impl Process {
         }
     }
 
-    /// Ends it. It may be stopped or hang: a signal that it would have to handle would not reach it.
+    /// Ends it. It may be stopped or hang: a signal that it had to handle would not reach it.
     pub fn kill(&mut self) {
         match self {
             Self::Started(child) => {

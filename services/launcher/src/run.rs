@@ -40,11 +40,11 @@ impl<E: std::fmt::Display> From<E> for Refusal {
 /// Runs a graph; returns the exit code: 0 done, 1 the run had a failure, 2 nothing was started.
 #[must_use]
 pub fn launch(args: &LauncherArgs) -> ExitCode {
-    let prepared = match args.adopt {
-        true => Prepared::of_running(args),
-        false => Prepared::new(args),
+    let graph = match args.adopt {
+        true => OwnGraph::of_running(args),
+        false => OwnGraph::new(args),
     };
-    match prepared.map(|prepared| prepared.run(args)) {
+    match graph.map(|graph| graph.run(args)) {
         Ok(Ok(false)) => ExitCode::SUCCESS,
         Ok(Ok(true)) => ExitCode::from(1),
         Ok(Err(error)) => {
@@ -59,13 +59,13 @@ pub fn launch(args: &LauncherArgs) -> ExitCode {
 }
 
 /// A graph that is this launcher's, and is not looked after yet.
-struct Prepared {
+struct OwnGraph {
     plan: Plan,
     domain: Domain,
     locks: Locks,
 }
 
-impl Prepared {
+impl OwnGraph {
     /// Checks everything that the services will read, and makes the graph this launcher's.
     fn new(args: &LauncherArgs) -> Result<Self, Refusal> {
         let plan = Plan::new(args)?;
@@ -159,7 +159,7 @@ impl Prepared {
             plan: &plan,
             teller: &mut teller,
         };
-        let ended = watch.to_end(&mut observer, &mut children);
+        let ended = watch.until_end(&mut observer, &mut children);
         observer.close(DRAIN);
         children.stop();
         observer.poll();
@@ -232,7 +232,7 @@ struct Watch<'a> {
 
 impl Watch<'_> {
     /// Watches until the end; returns why it ended.
-    fn to_end(&mut self, observer: &mut HealthObserver, children: &mut Children) -> EndReason {
+    fn until_end(&mut self, observer: &mut HealthObserver, children: &mut Children) -> EndReason {
         let plan = self.plan;
         let mut waiting = Waiting::new(&plan.setup);
         let services = plan.services().collect();

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::{Health, Rejection};
 use vigil_cycle::latency::Percentiles;
@@ -14,7 +15,7 @@ use vigil_timeline::{Timeline, TimelineEntry, told};
 use crate::observer::Counters;
 
 /// Why a run ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum EndReason {
     /// The duration is over.
@@ -30,13 +31,19 @@ pub enum EndReason {
 }
 
 /// A latency distribution, us.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, JsonSchema)]
 pub struct Microseconds {
+    /// How many.
     n: u64,
+    /// Median.
     p50: f64,
+    /// Nine of ten lie below.
     p90: f64,
+    /// 99 of 100 lie below.
     p99: f64,
+    /// 999 of 1000 lie below.
     p999: f64,
+    /// The largest.
     max: f64,
 }
 
@@ -55,25 +62,35 @@ impl From<Percentiles> for Microseconds {
 }
 
 /// What one service did.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ServiceSummary {
     #[serde(flatten)]
     counters: Counters,
     /// Refused input by cause; causes that did not occur are left out.
     rejected: BTreeMap<&'static str, u64>,
+    /// How often it was started again.
     restarts: usize,
+    /// Its last process.
     pid: u32,
+    /// Core on which it runs.
     core: u32,
+    /// Core that the configuration asks for.
     core_wanted: u32,
+    /// True if it is pinned there.
     pinned: bool,
+    /// Its scheduling class and priority.
     scheduling: String,
     /// Of the thread that cycles; null if the service left no report.
     timer_slack_ns: Option<u64>,
+    /// True if its memory is locked.
     memory_locked: bool,
+    /// From the due instant to the wake-up.
     #[serde(skip_serializing_if = "Option::is_none")]
     wake_up_us: Option<Microseconds>,
+    /// Of its computation.
     #[serde(skip_serializing_if = "Option::is_none")]
     step_us: Option<Microseconds>,
+    /// From the schedule of a cycle to its output.
     #[serde(skip_serializing_if = "Option::is_none")]
     from_schedule_us: Option<Microseconds>,
     /// Minor and major page faults in the steady state.
@@ -82,21 +99,33 @@ pub struct ServiceSummary {
 }
 
 /// What happened in a run.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Summary {
+    /// Version of this document.
     schema_version: u32,
+    /// Name of the graph.
     graph: String,
+    /// Rate of its schedule.
     rate_hz: f64,
+    /// Time since every service answered for the first time.
     duration_s: f64,
+    /// Why it ended.
     ended: EndReason,
+    /// False of a debug build: its times mean nothing.
     release_build: bool,
+    /// Hash of the configuration and every file that it names.
     config_hash: String,
+    /// What each service did, by its name.
     services: BTreeMap<&'static str, ServiceSummary>,
+    /// From the schedule of a cycle to its action.
     end_to_end_us: Microseconds,
     /// Per detector, how long it saw nothing, s, by cause.
     blind: BTreeMap<&'static str, BTreeMap<&'static str, f64>>,
+    /// What happened, in order.
     events: Vec<TimelineEntry>,
+    /// Events that were lost before they could be read.
     events_overwritten: u64,
+    /// The service that was given up, and why.
     #[serde(skip_serializing_if = "Option::is_none")]
     gave_up: Option<String>,
 }

@@ -145,6 +145,37 @@ impl GraphArgs {
     /// # Errors
     /// Why the graph file cannot be understood.
     pub fn read(&self) -> Result<Document, SetupError> {
+        let mut document = self.read_replaced()?;
+        let pairs = self.replaced();
+        document.replaced = pairs
+            .map(|(key, option)| (key.into(), option.into()))
+            .collect();
+        Ok(document)
+    }
+
+    /// Keys of the graph file whose values are replaced, each with the option that does.
+    fn replaced(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
+        let given = [
+            ("graph.rate_hz", "--rate", self.rate.is_some()),
+            ("graph.name", "--graph", self.graph.is_some()),
+            ("graph.seed", "--seed", self.seed.is_some()),
+            (
+                "identifier.filter",
+                "--identifier",
+                self.identifier.is_some(),
+            ),
+            ("sensor.source", "--source", self.source.is_some()),
+            ("sensor.socket.udp", "--socket", self.socket.is_some()),
+            ("sensor.source", "--replay", self.replay.is_some()),
+            ("sensor.frames", "--replay", self.replay.is_some()),
+            ("sensor.runs", "--runs", self.runs.is_some()),
+            ("sensor.speed", "--speed", self.speed.is_some()),
+        ];
+        let given = given.into_iter().filter(|(.., is_given)| *is_given);
+        given.map(|(key, option, _)| (key, option))
+    }
+
+    fn read_replaced(&self) -> Result<Document, SetupError> {
         Document::read(&self.config, |file| {
             if let Some(rate_hz) = self.rate {
                 file.graph.rate_hz = rate_hz;

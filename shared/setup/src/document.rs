@@ -1,5 +1,6 @@
 //! What a start reads, once: the graph file and the texts of the files that it names.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -65,6 +66,9 @@ pub struct Document {
     pub(crate) policy: Option<TextFile>,
     /// The graph file, options applied.
     pub file: GraphFile,
+    /// The options that have replaced a value, by its key.
+    #[serde(default)]
+    pub(crate) replaced: BTreeMap<String, String>,
 }
 
 impl Document {
@@ -86,6 +90,7 @@ impl Document {
             policy: file.supervisor.policy_file.as_ref().map(named),
             graph,
             file,
+            replaced: BTreeMap::new(),
         })
     }
 

@@ -67,6 +67,11 @@ impl Document {
     /// # Errors
     /// Every problem found, at once.
     pub fn border(&self) -> Result<Border, SetupError> {
+        self.checked_border()
+            .map_err(|error| self.blame_options(error))
+    }
+
+    fn checked_border(&self) -> Result<Border, SetupError> {
         let mut problems = Vec::new();
         let robot = keep(robot(&self.robot), &mut problems);
         self.check_graph(robot.as_ref(), &mut problems)?;
@@ -101,6 +106,10 @@ impl Document {
     /// # Errors
     /// Every problem found, at once.
     pub fn check(&self) -> Result<Setup, SetupError> {
+        self.checked().map_err(|error| self.blame_options(error))
+    }
+
+    fn checked(&self) -> Result<Setup, SetupError> {
         let (file, path) = (&self.file, &self.graph.path);
         let mut problems = Vec::new();
         let robot = keep(robot(&self.robot), &mut problems);

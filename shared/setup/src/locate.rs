@@ -14,10 +14,22 @@ pub(crate) fn line_of_byte(text: &str, byte: usize) -> usize {
 /// Line (from 1) of the key at `path` (`services.detector.core`, `drive.2.speed_m_s`), or of the
 /// deepest part of the path that exists; 1 if nothing of it does.
 pub(crate) fn line_of_key(text: &str, path: &str) -> usize {
+    let (byte, _) = place_of_key(text, path);
+    line_of_byte(text, byte)
+}
+
+/// Line (from 1) of the key at `path`, if it is there.
+pub(crate) fn line_of_given_key(text: &str, path: &str) -> Option<usize> {
+    let (byte, parts) = place_of_key(text, path);
+    (parts == path.split('.').count()).then(|| line_of_byte(text, byte))
+}
+
+/// Where the deepest part of the path that exists begins, and how many parts exist.
+fn place_of_key(text: &str, path: &str) -> (usize, usize) {
+    let (mut byte, mut parts) = (0, 0);
     let Ok(root) = DeTable::parse(text) else {
-        return 1;
+        return (byte, parts);
     };
-    let mut byte = 0;
     let mut table = Some(root.get_ref());
     let mut array: Option<&[toml::Spanned<DeValue<'_>>]> = None;
     for part in path.split('.') {
@@ -41,8 +53,9 @@ pub(crate) fn line_of_key(text: &str, path: &str) -> usize {
             DeValue::Array(items) => array = Some(items),
             _ => {}
         }
+        parts += 1;
     }
-    line_of_byte(text, byte)
+    (byte, parts)
 }
 
 #[cfg(test)]
@@ -58,6 +71,9 @@ mod tests {
         assert_eq!(line_of_key(TEXT, "services.detector.core"), 5);
         assert_eq!(line_of_key(TEXT, "services.detector.b"), 6);
         assert_eq!(line_of_key(TEXT, "drive.1.y"), 10);
+        assert_eq!(line_of_given_key(TEXT, "services.detector.b"), Some(6));
+        assert_eq!(line_of_given_key(TEXT, "services.detector.c"), None);
+        assert_eq!(line_of_given_key("[graph", "graph"), None);
     }
 
     #[test]

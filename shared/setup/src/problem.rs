@@ -14,6 +14,8 @@ pub struct Problem {
     pub line: usize,
     /// Key, or empty.
     pub key: String,
+    /// The option of the command line that has given the value in place of the file.
+    pub option: Option<String>,
     /// What is wrong and what is allowed.
     pub message: String,
 }
@@ -25,6 +27,7 @@ impl Problem {
             file: path.to_path_buf(),
             line: line_of_key(text, key),
             key: key.to_owned(),
+            option: None,
             message,
         }
     }
@@ -35,6 +38,7 @@ impl Problem {
             file: path.to_path_buf(),
             line,
             key: String::new(),
+            option: None,
             message,
         }
     }
@@ -42,6 +46,9 @@ impl Problem {
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(option) = &self.option {
+            return write!(f, "{option}: {}", self.message);
+        }
         write!(f, "{}", self.file.display())?;
         if self.line > 0 {
             write!(f, ":{}", self.line)?;

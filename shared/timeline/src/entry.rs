@@ -2,13 +2,14 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::wall_clock::time_of_day;
 use crate::weighing::NamedWeighing;
 
 /// An event in words.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TimelineEntry {
     /// Seconds since every service answered for the first time; `None` while they have not.
     pub t_s: Option<f64>,
@@ -43,7 +44,7 @@ pub struct TimelineEntry {
 }
 
 /// A fault that has another state, with its names.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct NamedFault {
     /// Counts the graph's faults, from 1.
     pub number: u64,
@@ -60,7 +61,7 @@ impl fmt::Display for NamedFault {
 }
 
 /// A step of the decision model, with its names.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct NamedStep {
     /// From 1, since the supervisor started.
     pub number: u64,

@@ -3,6 +3,7 @@
 mod entry;
 mod event_file;
 mod namer;
+mod record;
 mod timeline;
 mod told;
 mod wall_clock;

@@ -14,7 +14,7 @@ use vigil_robot::publisher_check::Finding;
 use vigil_setup::{Setup, fault_name};
 
 use crate::entry::{NamedFault, NamedStep, TimelineEntry};
-use crate::timeline::Record;
+use crate::record::Record;
 use crate::wall_clock::WallClock;
 use crate::weighing::NamedWeighing;
 use crate::words;

@@ -9,15 +9,7 @@ use vigil_setup::Setup;
 
 use crate::entry::TimelineEntry;
 use crate::namer::Namer;
-
-/// An event as it came.
-#[derive(Debug, Clone)]
-pub(crate) struct Record {
-    pub(crate) service: ServiceName,
-    pub(crate) event: Event,
-    /// What it says, if no block can carry that.
-    pub(crate) text: Option<String>,
-}
+use crate::record::Record;
 
 /// All events of a run.
 pub struct Timeline {

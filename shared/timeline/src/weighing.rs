@@ -2,11 +2,12 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use vigil_blocks::{ValueKind, Weighing};
 
 /// What a decision was weighed from, with the names of the decision model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NamedWeighing {
     /// The most probable states, at most two.
     pub states: Vec<NamedState>,
@@ -18,7 +19,7 @@ pub struct NamedWeighing {
 }
 
 /// A state of the decision model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NamedState {
     /// Its name.
     pub name: String,
@@ -27,7 +28,7 @@ pub struct NamedState {
 }
 
 /// An action that was not taken.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NamedSecond {
     /// Its name.
     pub action: String,

@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::fs;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::{
     Action, Control, DetectionBelief, FaultBelief, Faults, Health, ParticleBlock, SensorFrame,
@@ -33,10 +34,14 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Document<'a> {
+/// What it prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document<'a> {
+    /// Version of this document.
     schema_version: u32,
+    /// False if something would not work.
     ok: bool,
+    /// What was looked at.
     findings: &'a [Finding],
 }
 

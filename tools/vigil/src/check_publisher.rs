@@ -1,5 +1,6 @@
 //! `vigil check-publisher`: what fits and what does not in an external publisher's frames.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_setup::GraphArgs;
 
@@ -25,12 +26,18 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Document<'a> {
+/// What it prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document<'a> {
+    /// Version of this document.
     schema_version: u32,
+    /// False if something does not fit.
     ok: bool,
+    /// Frames that came.
     frames: usize,
+    /// Time for which it listened, s.
     seconds: f64,
+    /// What was looked at.
     findings: &'a [Finding],
 }
 

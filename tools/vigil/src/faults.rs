@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use vigil_setup::RunningArgs;
 use vigil_terminal::{CommandError, Outcome, output};
 
-use document::Document;
+pub use document::Document;
 pub use order::{AckArgs, ClearArgs, acknowledge, clear};
 use view::View;
 

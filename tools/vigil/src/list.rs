@@ -2,6 +2,7 @@
 
 use std::time::SystemTime;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_cycle::Domain;
 use vigil_setup::RunningGraph;
@@ -17,31 +18,39 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Document {
+/// What it prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// The graphs, by name.
     graphs: Vec<ListedGraph>,
 }
 
 /// A graph that runs.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct ListedGraph {
+    /// Its name.
     name: String,
     /// Process id of its launcher; null if that is gone.
     launcher: Option<u32>,
+    /// Its services, as their launcher has listed them last.
     services: Vec<ListedService>,
     /// Since its start, s.
     up_s: Option<f64>,
     /// Where its configuration was read from; null for `check-publisher` and `record`, which listen
     /// in place of a graph.
     config: Option<String>,
+    /// Rate of its schedule.
     rate_hz: Option<f64>,
 }
 
 /// A service of it.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct ListedService {
+    /// Its name.
     name: &'static str,
+    /// Its process.
     pid: u32,
     /// False if it has ended.
     lives: bool,

@@ -18,6 +18,8 @@ mod print_types;
 mod publisher;
 mod record;
 mod run;
+mod schemas;
+mod shell;
 mod status;
 mod stop;
 mod top;
@@ -26,7 +28,7 @@ mod watch;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{Arg, CommandFactory, Parser, Subcommand};
 use vigil_launcher::LauncherArgs;
 use vigil_terminal::exit_code;
 
@@ -53,17 +55,29 @@ enum Command {
     Clear(faults::ClearArgs),
     Inject(inject::Args),
     Check(check::Args),
+    #[command(mut_args(only_of_the_border))]
     CheckPublisher(check_publisher::Args),
     Config(config::Args),
     Graph(graph::Args),
+    #[command(mut_args(only_of_the_border))]
     Record(record::Args),
     #[command(name = "channels")]
     PrintChannels(print_channels::Args),
     #[command(name = "types")]
     PrintTypes(print_types::Args),
+    Schema(schemas::Args),
+    Completions(shell::CompletionsArgs),
+    Man(shell::ManArgs),
     /// A command of the laboratory.
     #[command(external_subcommand)]
     Laboratory(Vec<OsString>),
+}
+
+/// Options of a graph that mean nothing to publishers are not shown there.
+fn only_of_the_border(arg: Arg) -> Arg {
+    let id = arg.get_id().as_str();
+    let is_other = ["seed", "identifier", "replay", "runs", "speed"].contains(&id);
+    arg.hide(is_other)
 }
 
 fn main() -> ExitCode {
@@ -86,6 +100,9 @@ fn main() -> ExitCode {
         Command::Record(args) => record::run(&args),
         Command::PrintChannels(args) => print_channels::run(&args),
         Command::PrintTypes(args) => print_types::run(&args),
+        Command::Schema(args) => schemas::run(&args),
+        Command::Completions(args) => shell::completions(&args, Args::command()),
+        Command::Man(args) => shell::man(&args, Args::command()),
         Command::Laboratory(words) => laboratory::run(&words),
     })
 }

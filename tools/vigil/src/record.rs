@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::{COMMANDS, Rejection, SensorFrame};
 use vigil_recording::FrameWriter;
@@ -43,13 +44,20 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Document {
+/// What it prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// The file that was written.
     frames_file: String,
+    /// Frames that were written.
     frames: u64,
+    /// Runs in which they lie.
     runs: u32,
+    /// Time that the runs cover.
     recorded_s: f64,
+    /// Frames that were left out, by cause.
     refused: BTreeMap<&'static str, u64>,
 }
 

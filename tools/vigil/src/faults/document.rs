@@ -2,6 +2,7 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::{
     FaultRecord, FaultSource, FaultState, Faults, OverallState, Severity, SizeKind,
@@ -11,9 +12,11 @@ use vigil_robot::channel::{channels, evidence_name};
 use vigil_setup::{Setup, fault_name};
 
 /// The faults of a graph.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Name of the graph.
     graph: String,
     /// In one word.
     pub overall: &'static str,
@@ -26,23 +29,33 @@ pub struct Document {
 }
 
 /// A fault with its names. Times are seconds ago, and of the day as seconds since 1970.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct NamedFault {
+    /// Counts the graph's faults, from 1.
     pub number: u64,
+    /// Its name.
     pub name: String,
+    /// What it is a fault of: `robot`, `input`, `service`.
     pub source: &'static str,
+    /// Where it is in its life.
     pub state: &'static str,
+    /// `fault` or `warning`.
     pub severity: &'static str,
     /// How often it became active.
     pub count: u32,
+    /// When it was present first, since 1970.
     pub first_unix_s: f64,
+    /// When it was present last, since 1970.
     pub last_unix_s: f64,
+    /// When its state changed, since 1970.
     pub changed_unix_s: f64,
     /// How long ago it was present first.
     pub first_ago_s: f64,
     /// How long ago its state changed.
     pub changed_ago_s: f64,
+    /// Its probability when it was present last.
     pub p: f64,
+    /// How much is broken.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<FaultSize>,
     /// What speaks most for it, against what, by how many nat.
@@ -55,15 +68,17 @@ pub struct NamedFault {
     pub freeze_frame: Option<FreezeFrame>,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct FaultSize {
     /// In which way it is broken.
     pub way: &'static str,
     /// In `unit`; both absent for a way that has no size.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
+    /// Its standard deviation, in `unit`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sd: Option<f64>,
+    /// The unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<&'static str>,
     /// All of it in words.
@@ -71,14 +86,17 @@ pub struct FaultSize {
     pub text: String,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct NamedEvidence {
+    /// The channel that says most.
     pub channel: String,
+    /// The fault that would be next.
     pub against: String,
+    /// By how much, as a logarithm of likelihoods.
     pub nat: f64,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct FreezeFrame {
     /// Capture time, ns of the publisher's clock.
     pub t_capture_ns: u64,

@@ -1,5 +1,6 @@
 //! What detector and identifier believe, with names.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::{Blindness, DetectionBelief, FaultBelief, FaultSet, Readiness};
 use vigil_robot::FaultTree;
@@ -10,10 +11,11 @@ use crate::faults::document::Now;
 const P_MIN: f64 = 0.001;
 
 /// The detector's belief.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Detector {
     /// Probability that something is wrong.
     pub p_fault: f64,
+    /// True while an alarm stands.
     pub alarm: bool,
     /// Alarms so far.
     pub alarm_count: u32,
@@ -28,7 +30,7 @@ pub struct Detector {
 }
 
 /// The identifier's belief.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Diagnosis {
     /// The reported mode.
     pub mode: String,
@@ -38,6 +40,7 @@ pub struct Diagnosis {
     pub identifying: bool,
     /// Name of the nominal mode.
     pub nominal: String,
+    /// Probability of the nominal mode: no fault at all.
     pub p_nominal: f64,
     /// Probability that no known fault explains the data.
     pub p_unknown: f64,
@@ -48,9 +51,11 @@ pub struct Diagnosis {
 }
 
 /// A node of the fault tree.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct NamedNode {
+    /// Its name.
     pub name: String,
+    /// Its probability.
     pub p: f64,
     /// True of a leaf.
     pub is_leaf: bool,
@@ -60,9 +65,11 @@ pub struct NamedNode {
 }
 
 /// A set of faults that are present together.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct NamedSet {
+    /// Their names.
     pub faults: Vec<String>,
+    /// Its probability.
     pub p: f64,
 }
 

@@ -1,5 +1,6 @@
 //! What the supervisor does, and why, with names.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::{Action, ControlMode, Weighing};
 use vigil_setup::Setup;
@@ -9,7 +10,7 @@ use vigil_timeline::{NamedState, NamedWeighing};
 const STATES: usize = 3;
 
 /// The present decision.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Decision {
     /// The action, with the wheels that it is about.
     pub action: String,

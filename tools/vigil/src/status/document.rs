@@ -1,5 +1,6 @@
 //! All that is known of a graph, with names: for programs, and for those who draw it.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::OverallState;
 use vigil_setup::Setup;
@@ -19,9 +20,11 @@ const STALE_S: f64 = 1.0;
 const EVENTS: usize = 20;
 
 /// How a graph is.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Name of the graph.
     pub graph: String,
     /// In one word.
     pub state: GraphState,
@@ -43,11 +46,17 @@ pub struct Document {
     pub faults: Vec<NamedFault>,
     /// What is present beside them, and has no place.
     pub faults_dropped: u32,
+    /// What the detector believes; null before it has said anything.
     pub detector: Option<Detector>,
+    /// What the identifier believes.
     pub diagnosis: Option<Diagnosis>,
+    /// What the supervisor does.
     pub decision: Option<Decision>,
+    /// The services, in the order of the data.
     pub services: Vec<Service>,
+    /// How long actions take; null before the second one.
     pub end_to_end: Option<Percentiles>,
+    /// What of the frames can be used; null before the first one.
     pub input: Option<Input>,
     /// The newest events; the newest last.
     pub events: Vec<TimelineEntry>,

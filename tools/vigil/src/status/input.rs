@@ -1,5 +1,6 @@
 //! What of the frames can be used.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::{Blindness, Rejection, SensorFrame};
 use vigil_cycle::topic::ServiceName;
@@ -9,7 +10,7 @@ use vigil_robot::channel::channels;
 use crate::watch::View;
 
 /// Health of the input.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Input {
     /// Channels that the robot has, but those that frames may lack.
     pub channels: usize,
@@ -26,9 +27,11 @@ pub struct Input {
 }
 
 /// Refused frames of one cause.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RejectedFrames {
+    /// Why.
     pub cause: &'static str,
+    /// How many.
     pub count: u64,
 }
 

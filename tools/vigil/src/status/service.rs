@@ -1,5 +1,6 @@
 //! How a service is.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::{Degraded, Health, ServiceState};
 use vigil_cycle::Placement;
@@ -11,8 +12,9 @@ use crate::watch::View;
 const SILENT_S: f64 = 1.0;
 
 /// A service of the graph.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Service {
+    /// Its name.
     pub name: &'static str,
     /// `starting`, `ready`, `running`, `degraded`, `stopping`, `silent` or `gone`.
     pub state: &'static str,
@@ -23,22 +25,31 @@ pub struct Service {
 }
 
 /// What a service says of itself.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ServiceHealth {
+    /// Process id.
     pub pid: u32,
+    /// Since it said so.
     pub age_s: f64,
+    /// Cycles done.
     pub cycles: u64,
     /// From wake-up to publication, of the last cycle.
     pub cycle_us_last: f64,
+    /// Of the longest cycle.
     pub cycle_us_max: f64,
+    /// What a cycle may take.
     pub budget_us: f64,
     /// Deadlines missed.
     pub missed: u64,
     /// Cycles longer than the budget.
     pub over_budget: u64,
+    /// Input blocks that never arrived.
     pub lost: u64,
+    /// Input blocks that arrived after their deadline.
     pub late: u64,
+    /// Input blocks that were refused.
     pub rejected: u64,
+    /// Core that it runs on.
     pub core: u32,
     /// True if it may run on no other core.
     pub pinned: bool,

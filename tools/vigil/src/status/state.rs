@@ -1,10 +1,11 @@
 //! How a graph is, in one word.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::OverallState;
 
 /// How a graph is: the supervisor's overall state, unless something worse is the matter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum GraphState {
     /// Nothing is wrong.

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use hdrhistogram::Histogram;
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::Header;
 
@@ -18,7 +19,7 @@ pub struct EndToEnd {
 }
 
 /// How their times are distributed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Percentiles {
     /// From the first of the actions to the last.
     pub window_s: f64,
@@ -30,13 +31,13 @@ pub struct Percentiles {
     pub sent: u64,
     /// Actions a second.
     pub rate_hz: f64,
-    /// From schedule to publication.
+    /// From schedule to publication: half of them take no longer.
     pub latency_us_p50: f64,
-    /// See `latency_us_p50`.
+    /// Nine in ten take no longer.
     pub latency_us_p90: f64,
-    /// See `latency_us_p50`.
+    /// All but one in a hundred take no longer.
     pub latency_us_p99: f64,
-    /// See `latency_us_p50`.
+    /// The longest.
     pub latency_us_max: f64,
 }
 
