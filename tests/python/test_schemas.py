@@ -67,6 +67,7 @@ class Schemas(unittest.TestCase):
             kinds = {json.loads(event)["event"] for event in events}
             self.assertLessEqual({"alarm", "diagnosis", "weighed", "reason", "fault"}, kinds)
             self.document("faults", "--graph", graph.name)
+            self.document("status", "--graph", graph.name)
             self.document("list")
             self.check("run", graph.stop())
 

@@ -34,7 +34,8 @@ impl WallClock {
 }
 
 /// Time of day where the machine stands, of an instant as [`WallClock::rfc3339`] writes it.
-pub(crate) fn time_of_day(rfc3339: &str) -> String {
+#[must_use]
+pub fn time_of_day(rfc3339: &str) -> String {
     let timestamp: Result<Timestamp, _> = rfc3339.parse();
     timestamp.map_or_else(
         |_| "?".to_owned(),

@@ -37,7 +37,9 @@ pub struct NamedSecond {
 }
 
 impl NamedWeighing {
-    pub(crate) fn new(weighing: &Weighing, states: &[String], actions: &[String]) -> Self {
+    /// Names the states and actions of a weighing.
+    #[must_use]
+    pub fn new(weighing: &Weighing, states: &[String], actions: &[String]) -> Self {
         let name =
             |names: &[String], at: usize| names.get(at).map_or("?", String::as_str).to_owned();
         let state = |(at, p): (usize, f32)| NamedState {
@@ -58,6 +60,19 @@ impl NamedWeighing {
             .to_owned(),
         }
     }
+
+    /// Why the second best action was not taken; `None` if there is no other.
+    #[must_use]
+    pub fn second_text(&self) -> Option<String> {
+        let NamedSecond { action, less } = self.second.as_ref()?;
+        let (size, is_less) = (less.abs(), *less >= 0.0);
+        let word = if is_less { "less" } else { "more" };
+        Some(match self.measure.as_str() {
+            "votes" => format!("{action} has {size:.2} {word} of the votes"),
+            "entropy" => format!("{action} would tell {size:.3} {word}"),
+            _ => format!("{action} would earn {size:.2} {word}"),
+        })
+    }
 }
 
 impl fmt::Display for NamedWeighing {
@@ -65,16 +80,8 @@ impl fmt::Display for NamedWeighing {
         let state = |state: &NamedState| format!("{} {:.3}", state.name, state.p);
         let states: Vec<String> = self.states.iter().map(state).collect();
         write!(f, "{}", states.join(", "))?;
-        let Some(NamedSecond { action, less }) = &self.second else {
-            return Ok(());
-        };
-        let (size, is_less) = (less.abs(), *less >= 0.0);
-        let word = if is_less { "less" } else { "more" };
-        match self.measure.as_str() {
-            "votes" => write!(f, "; {action} has {size:.2} {word} of the votes"),
-            "entropy" => write!(f, "; {action} would tell {size:.3} {word}"),
-            _ => write!(f, "; {action} would earn {size:.2} {word}"),
-        }
+        self.second_text()
+            .map_or(Ok(()), |second| write!(f, "; {second}"))
     }
 }
 

@@ -1,8 +1,8 @@
 //! `vigil faults`, `ack` and `clear`: the life of the faults of a running graph.
 
-mod document;
+pub mod document;
 mod order;
-mod table;
+pub mod table;
 mod view;
 
 use std::time::{Duration, Instant};

@@ -20,7 +20,10 @@ mod record;
 mod run;
 mod schemas;
 mod shell;
+mod status;
 mod stop;
+mod top;
+mod watch;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -43,6 +46,8 @@ struct Args {
 enum Command {
     Run(Box<LauncherArgs>),
     List(list::Args),
+    Status(status::Args),
+    Top(top::Args),
     Stop(stop::Args),
     Events(events::Args),
     Faults(faults::Args),
@@ -80,6 +85,8 @@ fn main() -> ExitCode {
         // The launcher understands the same words once more.
         Command::Run(_) => run::run(),
         Command::List(args) => list::run(&args),
+        Command::Status(args) => status::run(&args),
+        Command::Top(args) => top::run(&args),
         Command::Stop(args) => stop::run(&args),
         Command::Events(args) => events::run(&args),
         Command::Graph(args) => graph::run(&args),

@@ -7,7 +7,7 @@ use vigil_launcher::Summary;
 use vigil_terminal::{CommandError, Outcome, output};
 use vigil_timeline::TimelineEntry;
 
-use crate::{check, check_publisher, config, faults, list, record};
+use crate::{check, check_publisher, config, faults, list, record, status};
 
 /// Prints the JSON Schema of what a command prints with --json.
 ///
@@ -30,9 +30,10 @@ fn schema_of<T: schemars::JsonSchema>() -> Schema {
 }
 
 /// The commands that print JSON, each with its schema.
-const SCHEMAS: [(&str, Make); 8] = [
+const SCHEMAS: [(&str, Make); 9] = [
     ("run", schema_of::<Summary>),
     ("list", schema_of::<list::Document>),
+    ("status", schema_of::<status::Document>),
     ("events", schema_of::<TimelineEntry>),
     ("faults", schema_of::<faults::Document>),
     ("check", schema_of::<check::Document<'_>>),

@@ -107,13 +107,14 @@ pub struct FreezeFrame {
 }
 
 /// An instant of `CLOCK_MONOTONIC` on the clock of the wall.
-struct Now {
-    monotonic_ns: u64,
-    unix_s: f64,
+#[derive(Debug, Clone, Copy)]
+pub struct Now {
+    pub monotonic_ns: u64,
+    pub unix_s: f64,
 }
 
 impl Now {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH);
         Self {
             monotonic_ns: Monotonic.now_ns(),
@@ -138,7 +139,11 @@ fn rounded(seconds: f64) -> f64 {
 impl Document {
     /// A block with the names that a configuration gives.
     pub fn new(block: &Faults, setup: &Setup) -> Self {
-        let now = Now::new();
+        Self::at(block, setup, Now::new())
+    }
+
+    /// The same at a given instant.
+    pub fn at(block: &Faults, setup: &Setup, now: Now) -> Self {
         let mut records: Vec<&FaultRecord> = block.kept().collect();
         records.sort_by_key(|record| std::cmp::Reverse((record.changed_ns, record.number)));
         let overall = OverallState::from_repr(block.overall);

@@ -44,7 +44,7 @@ fn line(fault: &NamedFault) -> String {
 }
 
 /// The size, and what speaks for it.
-fn why(fault: &NamedFault) -> String {
+pub fn why(fault: &NamedFault) -> String {
     let evidence = fault.evidence.as_ref().map(|it| {
         let (channel, nat, against) = (&it.channel, it.nat, &it.against);
         format!("{channel} says so by {nat:.1} nat, against {against}")
@@ -55,7 +55,7 @@ fn why(fault: &NamedFault) -> String {
 }
 
 /// A time that has passed, short.
-fn ago(seconds: f64) -> String {
+pub fn ago(seconds: f64) -> String {
     match seconds {
         s if s < 60.0 => format!("{s:.1} s"),
         s if s < 3600.0 => format!("{:.0} min", s / 60.0),

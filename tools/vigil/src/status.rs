@@ -1,0 +1,53 @@
+//! `vigil status`: one look at a running graph.
+
+mod belief;
+mod decision;
+mod document;
+mod input;
+mod service;
+mod state;
+mod text;
+
+use vigil_setup::RunningArgs;
+use vigil_terminal::{CommandError, Outcome, output};
+
+use crate::faults::document::Now;
+use crate::watch::Watch;
+
+pub use belief::Diagnosis;
+pub use decision::Decision;
+pub use document::Document;
+pub use service::Service;
+pub use state::GraphState;
+pub use text::percent_text;
+
+/// Says how a running graph is: faults, beliefs, the decision, services, times.
+///
+/// Outcome 0 if nothing is wrong and a launcher looks after the graph, else 1.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    running: RunningArgs,
+    /// Print one JSON document.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints the status.
+///
+/// # Errors
+/// A graph that does not run; the transport's.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let mut watch = Watch::join(&args.running)?;
+    watch.first_look();
+    let document = Document::new(&watch.view, watch.setup(), Now::new());
+    let printed = match args.json {
+        true => output::json(&document),
+        false => output::line(&text::text(&document)),
+    };
+    printed.map_err(CommandError::failure)?;
+    Ok(match document.state {
+        GraphState::Ok => Outcome::Done,
+        _ => Outcome::Failed,
+    })
+}
