@@ -16,4 +16,4 @@ pub use timeline::Timeline;
 pub use told::{MISSES_APART_NS, told};
 pub use wall_clock::{WallClock, time_of_day};
 pub use weighing::{NamedSecond, NamedState, NamedWeighing};
-pub use words::watchdog as watchdog_text;
+pub use words::{degraded as degraded_text, watchdog as watchdog_text};

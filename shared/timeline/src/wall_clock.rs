@@ -25,6 +25,26 @@ impl WallClock {
         }
     }
 
+    /// A clock that is `ahead_ns` later since 1970 than `CLOCK_MONOTONIC` says, as of a graph that
+    /// ran at another time.
+    #[must_use]
+    pub const fn ahead_by(ahead_ns: i128) -> Self {
+        Self { ahead_ns }
+    }
+
+    /// From `CLOCK_MONOTONIC` to the time since 1970, ns.
+    #[must_use]
+    pub const fn ahead_ns(&self) -> i128 {
+        self.ahead_ns
+    }
+
+    /// Time since 1970, ns; 0 for what lies before.
+    #[must_use]
+    pub fn unix_ns(&self, t_ns: u64) -> u64 {
+        let unix_ns = self.ahead_ns + i128::from(t_ns);
+        u64::try_from(unix_ns.max(0)).unwrap_or(u64::MAX)
+    }
+
     /// RFC 3339, UTC, to the millisecond.
     #[must_use]
     pub fn rfc3339(&self, t_ns: u64) -> String {
@@ -52,9 +72,9 @@ mod tests {
 
     #[test]
     fn instants_have_a_date_and_a_time_to_the_millisecond() {
-        let clock = WallClock {
-            ahead_ns: 1_700_000_000_000_000_000,
-        };
+        let clock = WallClock::ahead_by(1_700_000_000_000_000_000);
+        assert_eq!(clock.unix_ns(12), 1_700_000_000_000_000_012);
+        assert_eq!(WallClock::ahead_by(-9).unix_ns(8), 0);
         // `date -u -d @1700000012` says 22:13:32 of 2023-11-14.
         assert_eq!(clock.rfc3339(12_345_678_901), "2023-11-14T22:13:32.345Z");
         assert_eq!(clock.rfc3339(u64::MAX), "2608-06-04T21:47:53.709Z");
