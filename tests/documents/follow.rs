@@ -211,6 +211,9 @@ fn arguments(program: &str, words: Vec<&str>, graph: &str, is_awaited: bool) -> 
         }
         words.extend(["--duration".into(), SHORT_S.into()]);
     }
+    if program == "scripts/up" {
+        words.push("--no-blackbox".into());
+    }
     if speaks_to_a_graph {
         words.extend(["--graph".into(), graph.into()]);
     }

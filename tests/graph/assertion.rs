@@ -15,7 +15,8 @@ fn fail(service: ServiceName, options: &[&str]) -> String {
     let name = unique(&format!("f-{}", service.as_str()));
     let output = binary("vigil-launcher")
         .env("VIGIL_FAILS", service.as_str())
-        .args(["--rate", "500", "--duration", "60", "--graph", &name])
+        .args(["--no-blackbox", "--rate", "500", "--duration", "60"])
+        .args(["--graph", &name])
         .args(options)
         .output()
         .unwrap();

@@ -70,7 +70,13 @@ fn orphan(name: &str, options: &[&str]) -> Value {
 #[test]
 fn a_graph_that_hears_no_publisher_says_so_and_ends_with_1() {
     let name = unique("unheard");
-    let source = ["--source", "external", "--start-timeout", "2"];
+    let source = [
+        "--source",
+        "external",
+        "--start-timeout",
+        "2",
+        "--no-blackbox",
+    ];
     let output = vigil(&[&["run", "--graph", &name], &source[..]].concat());
     assert_eq!(output.status.code(), Some(1), "{}", err(&output));
     let told = err(&output);
@@ -159,7 +165,7 @@ fn a_graph_whose_launcher_was_killed_is_stopped_and_leaves_nothing() {
         assert_eq!(domain.find_process(pid), None, "{pid}");
     }
     // The name is free again.
-    let again = vigil(&["run", "--graph", &name, "--duration", "1"]);
+    let again = vigil(&["run", "--graph", &name, "--duration", "1", "--no-blackbox"]);
     assert_eq!(again.status.code(), Some(0), "{}", err(&again));
 }
 
@@ -228,7 +234,14 @@ fn a_name_that_does_not_run_is_said_and_leaves_nothing_behind() {
 #[test]
 fn a_launcher_that_is_asked_to_stop_while_it_waits_has_seen_nothing() {
     let name = unique("waits");
-    let launcher = spawn(&["run", "--graph", &name, "--source", "external"]);
+    let launcher = spawn(&[
+        "run",
+        "--graph",
+        &name,
+        "--source",
+        "external",
+        "--no-blackbox",
+    ]);
     eventually("it is started", || Domain::running(&name));
     signal::terminate(launcher.id());
     let output = wait(launcher);

@@ -64,7 +64,14 @@ pub fn config_with(folder: &Path, change: impl FnOnce(String) -> String) -> Path
 /// Starts the launcher for a second at most, and waits for its end.
 pub fn launch(config: &Path, name: &str, options: &[&str]) -> Output {
     binary("vigil-launcher")
-        .args(["--json", "--duration", "1", "--graph", &unique(name)])
+        .args([
+            "--json",
+            "--no-blackbox",
+            "--duration",
+            "1",
+            "--graph",
+            &unique(name),
+        ])
         .arg("--config")
         .arg(config)
         .args(options)
@@ -94,7 +101,7 @@ impl RunningGraph {
             ..GraphArgs::default()
         };
         let mut launcher = binary("vigil-launcher")
-            .args(["--json", "--graph", &graph, "--config"])
+            .args(["--json", "--no-blackbox", "--graph", &graph, "--config"])
             .arg(&args.config)
             .args(options)
             .stdout(Stdio::piped())

@@ -88,7 +88,15 @@ fn a_miss_ends_the_graph_where_that_is_wanted() {
         )
     });
     let output = binary("vigil-launcher")
-        .args(["--json", "--duration", "60", "--rate", "1000", "--graph"])
+        .args([
+            "--json",
+            "--no-blackbox",
+            "--duration",
+            "60",
+            "--rate",
+            "1000",
+        ])
+        .arg("--graph")
         .arg(unique("stop"))
         .arg("--config")
         .arg(&config)
@@ -312,7 +320,8 @@ fn a_graph_without_any_privilege_works_and_says_what_it_did_not_get() {
         return;
     };
     let output = command
-        .args(["--json", "--duration", "4", "--config", "config/rover.toml"])
+        .args(["--json", "--no-blackbox", "--duration", "4"])
+        .args(["--config", "config/rover.toml"])
         .args(["--graph", &unique("plain")])
         .output()
         .unwrap();

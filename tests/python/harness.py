@@ -38,9 +38,11 @@ def publisher(name, *arguments):
 class Graph:
     """A graph of its own name on the default configuration; stopped at the end of a `with`."""
 
-    def __init__(self, *options, name=None):
+    def __init__(self, *options, name=None, recordings=None):
         self.name = name or f"py{os.getpid()}-{uuid.uuid4().hex[:6]}"
         self.options = options
+        # Folder of the black box, if it is to run.
+        self.recordings = recordings
         # A port of its own: another graph may be taking datagrams on this machine.
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
             free.bind(("127.0.0.1", 0))
@@ -52,7 +54,10 @@ class Graph:
         shutil.copytree(ROOT / "config", config)
         with open(config / "rover.toml", "a") as file:
             file.write(f'\n[sensor.socket]\nudp = "127.0.0.1:{self.udp_port}"\n')
+            if self.recordings:
+                file.write(f'[blackbox]\nfolder = "{self.recordings}"\nbefore_s = 3.0\nafter_s = 1.0\n')
         command = [BINARIES / "vigil-launcher", "--json", "--config", config / "rover.toml"]
+        command += [] if self.recordings else ["--no-blackbox"]
         command += ["--graph", self.name, *self.options]
         self.launcher = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         return self

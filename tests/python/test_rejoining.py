@@ -79,7 +79,7 @@ class SideBySide(unittest.TestCase):
     def test_two_graphs_on_one_file_take_datagrams_each_from_its_own_publisher(self):
         """One option each: the name."""
         names = [f"py{os.getpid()}-left", f"py{os.getpid()}-right"]
-        line = [BINARIES / "vigil-launcher", "--json", "--config", ROOT / "config" / "rover.toml"]
+        line = [BINARIES / "vigil-launcher", "--json", "--no-blackbox", "--config", ROOT / "config" / "rover.toml"]
         line += ["--source", "socket", "--rate", "20", "--duration", "2", "--graph"]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": ROOT}
         graphs = [subprocess.Popen([*line, name], **pipes) for name in names]

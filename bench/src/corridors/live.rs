@@ -101,7 +101,8 @@ impl RunningGraph {
         find_models(&mut file)?;
         fs::write(&config, file.to_string())?;
         let mut command = Command::new(std::env::current_exe()?.with_file_name("vigil-launcher"));
-        command.arg("--config").arg(&config).arg("--json");
+        command.arg("--config").arg(&config);
+        command.args(["--json", "--no-blackbox"]);
         if let Some(fault) = &plan.hardware {
             let injection = format!("{}@{}", fault.change, fault.at_s);
             command.args(["--inject", &injection]);

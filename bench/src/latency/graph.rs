@@ -174,7 +174,13 @@ impl GraphFile {
             .arg("--stamps")
             .arg(folder);
         command.args(["--stamped-cycles", &kept.to_string()]);
-        command.args(["--json", "--duration", &seconds.to_string()]);
+        // What the black box costs is a measurement of its own.
+        command.args([
+            "--json",
+            "--no-blackbox",
+            "--duration",
+            &seconds.to_string(),
+        ]);
         if self.is_faulty {
             command.args(["--inject", FAULT]);
         }

@@ -1,5 +1,42 @@
-//! `vigil-blackbox`.
+//! `vigil-blackbox`: keeps the last seconds of a graph, and writes them at an alarm, a crash, or on
+//! demand. It only observes. Exit codes: 0 stopped, 1 failed, 2 no graph.
 
+mod feeds;
+mod folder;
+mod reason;
+mod recorder;
 mod ring;
+mod watch;
 
-fn main() {}
+use std::process::ExitCode;
+
+use clap::Parser;
+use vigil_setup::RunningArgs;
+
+/// Keeps the last seconds of a running graph, and writes them at an alarm, a crash, or on demand.
+///
+/// The launcher starts it; it ends with the graph.
+#[derive(Debug, Parser)]
+#[command(version, about)]
+struct Args {
+    #[command(flatten)]
+    running: RunningArgs,
+}
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    let running = match args.running.find() {
+        Ok(running) => running,
+        Err(error) => {
+            eprintln!("vigil-blackbox: {error}");
+            return ExitCode::from(2);
+        }
+    };
+    match watch::run(running) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("vigil-blackbox: {error}");
+            ExitCode::from(1)
+        }
+    }
+}

@@ -206,7 +206,9 @@ impl RingReader {
         let is_sound = magic == MAGIC
             && capacity > 0
             && PAGE.checked_add(capacity) == Some(length)
-            && newest.checked_sub(oldest).is_some_and(|held| held <= capacity);
+            && newest
+                .checked_sub(oldest)
+                .is_some_and(|held| held <= capacity);
         if !is_sound {
             return Err(io::Error::other(format!("{} is no ring", path.display())));
         }

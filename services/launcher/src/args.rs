@@ -23,6 +23,9 @@ pub struct LauncherArgs {
     /// may take its time, and all else `watchdog.startup_s`.
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub start_timeout: Option<Duration>,
+    /// Start no black box, as `blackbox.enabled = false` does.
+    #[arg(long, conflicts_with = "adopt")]
+    pub no_blackbox: bool,
     /// Take over a running graph of which the launcher is gone, as --graph names it.
     #[arg(long, conflicts_with_all = [
         "config", "rate", "seed", "identifier", "source", "socket", "replay", "runs", "speed",

@@ -8,6 +8,7 @@ use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Domain, Monotonic, RunReport, signal};
 
+use crate::companion::Companion;
 use crate::error::LauncherError;
 use crate::locks::Locks;
 use crate::observer::HealthObserver;
@@ -35,6 +36,8 @@ struct ServiceProcess {
 /// All service processes of a graph.
 pub struct Children {
     services: Vec<ServiceProcess>,
+    blackbox: Option<Companion>,
+    domain: Domain,
     locks: Locks,
     restarted: Vec<ServiceName>,
     gave_up: Option<String>,
@@ -43,7 +46,7 @@ pub struct Children {
 impl Children {
     /// Starts every service of the plan; on a failure stops those already started.
     pub fn start(plan: &Plan, domain: &Domain, locks: Locks) -> Result<Self, LauncherError> {
-        let mut children = Self::none(locks);
+        let mut children = Self::none(domain, locks);
         for name in plan.services() {
             let (report, failure) = (report_file(domain, name), domain.failure_file(name));
             for old in [&report, &failure] {
@@ -57,14 +60,17 @@ impl Children {
         children
             .announce(plan, domain)
             .map_err(|cause| LauncherError::file(list, cause))?;
+        // It finds a graph that is announced.
+        children.blackbox = Some(Companion::start(plan, domain, None));
+        let _ = children.list();
         Ok(children)
     }
 
     /// Takes over the services of a launcher that is gone; those that are gone, too, are restarted.
     pub fn adopt(plan: &Plan, domain: &Domain, locks: Locks) -> Result<Self, LauncherError> {
-        let (mut children, listed) = (Self::none(locks), domain.processes().services);
+        let (mut children, listed) = (Self::none(domain, locks), domain.processes());
         for name in plan.services() {
-            let found = listed.iter().find(|(of, _)| *of == name);
+            let found = listed.services.iter().find(|(of, _)| *of == name);
             let found = found.and_then(|(_, pid)| domain.find_process(*pid));
             let process = match found {
                 Some(process) => Process::found(process),
@@ -72,15 +78,19 @@ impl Children {
             };
             children.add(plan, domain, (name, process));
         }
+        let found = listed.blackbox.and_then(|pid| domain.find_process(pid));
+        children.blackbox = Some(Companion::start(plan, domain, found));
         let list = domain.launcher_file();
         let listed = children.list();
         listed.map_err(|cause| LauncherError::file(list, cause))?;
         Ok(children)
     }
 
-    const fn none(locks: Locks) -> Self {
+    fn none(domain: &Domain, locks: Locks) -> Self {
         Self {
             services: Vec::new(),
+            blackbox: None,
+            domain: domain.clone(),
             locks,
             restarted: Vec::new(),
             gave_up: None,
@@ -113,7 +123,8 @@ impl Children {
     fn list(&mut self) -> io::Result<()> {
         let present = self.services.iter().map(|s| (s.name, s.process.id()));
         let present: Vec<_> = present.collect();
-        self.locks.launcher.list(&present)
+        let blackbox = self.blackbox.as_ref().and_then(Companion::id);
+        self.locks.launcher.list(&present, blackbox)
     }
 
     /// Restarts what has died; true if a service had to be given up.
@@ -165,6 +176,9 @@ impl Children {
                 }
             }
         }
+        if let Some(blackbox) = &mut self.blackbox {
+            is_listed &= !blackbox.look_after(plan, &self.domain);
+        }
         if !is_listed {
             // What cannot be listed runs all the same.
             let _ = self.list();
@@ -205,6 +219,10 @@ impl Children {
                 service.process.kill();
                 service.process.wait(KILL_LIMIT);
             }
+        }
+        // Last: it records how they ended.
+        if let Some(blackbox) = &mut self.blackbox {
+            blackbox.stop();
         }
     }
 

@@ -10,6 +10,7 @@ macro_rules! tell {
 
 mod args;
 mod children;
+mod companion;
 mod error;
 mod locks;
 mod observer;

@@ -75,6 +75,7 @@ impl Plan {
     /// Reads the configuration and checks the options against it.
     fn read(args: &LauncherArgs) -> Result<Self, LauncherError> {
         let mut document = args.graph.read()?;
+        document.file.blackbox.enabled &= !args.no_blackbox;
         let mut setup = document.check()?;
         if !args.inject.is_empty() && setup.file.sensor.source != Source::Simulator {
             return Err(LauncherError::NotSimulated);

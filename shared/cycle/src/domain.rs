@@ -175,6 +175,18 @@ impl Domain {
         self.folder.join("events")
     }
 
+    /// File in which the black box keeps the last seconds.
+    #[must_use]
+    pub fn ring_file(&self) -> PathBuf {
+        self.folder.join("ring")
+    }
+
+    /// File by which the black box is asked for a recording; it says why, and the box removes it.
+    #[must_use]
+    pub fn request_file(&self) -> PathBuf {
+        self.folder.join("request")
+    }
+
     /// File in which the supervisor keeps the faults, for one that replaces it.
     #[must_use]
     pub fn faults_file(&self) -> PathBuf {
@@ -333,6 +345,7 @@ impl Domain {
             self.start_file(),
             self.faults_file(),
             self.document_file(),
+            self.request_file(),
         ] {
             let _ = fs::remove_file(file);
         }

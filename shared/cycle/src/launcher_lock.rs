@@ -21,16 +21,25 @@ pub struct Processes {
     pub launcher: Option<u32>,
     /// The services and their process ids. They may have ended since.
     pub services: Vec<(ServiceName, u32)>,
+    /// The black box, if there is one; as the services.
+    pub blackbox: Option<u32>,
 }
 
 impl LauncherLock {
-    /// Lists the services that run now.
+    /// Lists the services that run now, and the black box.
     ///
     /// # Errors
     /// The file system's.
-    pub fn list(&mut self, services: &[(ServiceName, u32)]) -> io::Result<()> {
+    pub fn list(
+        &mut self,
+        services: &[(ServiceName, u32)],
+        blackbox: Option<u32>,
+    ) -> io::Result<()> {
         let line = |(name, pid): &(ServiceName, u32)| format!("{} {pid}\n", name.as_str());
-        let lines: String = services.iter().map(line).collect();
+        let mut lines: String = services.iter().map(line).collect();
+        if let Some(pid) = blackbox {
+            lines.push_str(&format!("blackbox {pid}\n"));
+        }
         self.file.rewind()?;
         self.file.set_len(0)?;
         // One write: a reader meets all of it, or nothing.
@@ -67,6 +76,7 @@ impl Domain {
             services: services
                 .filter_map(|&name| Some((name, pid(name.as_str())?)))
                 .collect(),
+            blackbox: pid("blackbox"),
         }
     }
 
@@ -90,9 +100,11 @@ mod tests {
         let mut lock = domain.lock_launcher().unwrap().unwrap();
         assert!(domain.lock_launcher().unwrap().is_none());
         let many = ServiceName::ALL.map(|name| (name, 4_000_000));
-        lock.list(&many).unwrap();
+        lock.list(&many, Some(9)).unwrap();
+        assert_eq!(domain.processes().blackbox, Some(9));
         let services = vec![(ServiceName::Detector, 7), (ServiceName::Supervisor, 8)];
-        lock.list(&services).unwrap();
+        lock.list(&services, None).unwrap();
+        assert_eq!(domain.processes().blackbox, None);
         let launcher = Some(std::process::id());
         let found = domain.processes();
         assert_eq!((found.launcher, &found.services), (launcher, &services));

@@ -63,6 +63,30 @@ pub fn apply(wanted: PlacementRequest) -> Placement {
     }
 }
 
+/// Lets the calling thread, and those that it starts, run on all cores but these, behind everybody
+/// else. If there are no others, it runs on all.
+pub fn keep_off(cores: &[usize]) {
+    // SAFETY: plain system calls on the calling thread; the sets are local and of the size that is
+    // given. Failure leaves the thread as it was.
+    #[allow(unsafe_code)]
+    unsafe {
+        let mut set: libc::cpu_set_t = std::mem::zeroed();
+        let size = size_of::<libc::cpu_set_t>();
+        if libc::sched_getaffinity(0, size, &raw mut set) == 0 {
+            for &core in cores
+                .iter()
+                .filter(|core| **core < libc::CPU_SETSIZE as usize)
+            {
+                libc::CPU_CLR(core, &mut set);
+            }
+            if libc::CPU_COUNT(&set) > 0 {
+                libc::sched_setaffinity(0, size, &raw const set);
+            }
+        }
+        libc::setpriority(libc::PRIO_PROCESS, 0, 15);
+    }
+}
+
 /// Lets the calling thread run on this core only; false if that is not permitted or there is no
 /// such core.
 pub fn pin(core: usize) -> bool {

@@ -12,10 +12,12 @@ use vigil_cycle::domain::Queues;
 use vigil_cycle::{Domain, PortError, service, watchdog};
 use vigil_diagnosis::{detect, identify};
 
+mod blackbox;
 mod navigation;
 mod sensor;
 mod simulator;
 
+pub use blackbox::Blackbox;
 pub use navigation::{Navigation, Obstacle, Trouble, TroubleKind};
 pub use sensor::{Sensor, Socket, Source};
 pub use simulator::{DriveSegment, Simulator};
@@ -71,6 +73,9 @@ pub struct GraphFile {
     /// within the bounds of `[restart]`.
     #[serde(default)]
     pub watchdog: watchdog::Settings,
+    /// The black box: how much it keeps, and when it writes a recording.
+    #[serde(default)]
+    pub blackbox: Blackbox,
 }
 
 /// Identity of the graph and its schedule.

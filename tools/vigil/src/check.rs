@@ -60,6 +60,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         preemption(),
         shared_memory(&setup),
     ]);
+    findings.push(blackbox(&setup));
     findings.push(residue(&setup));
     findings.push(build());
     let ok = findings::have_no_failure(&findings);
@@ -233,6 +234,29 @@ fn shared_memory(setup: &Setup) -> Finding {
             finding("shared memory", Status::Failure, detail)
         }
         None => finding("shared memory", Status::Failure, "/dev/shm cannot be used"),
+    }
+}
+
+/// What the black box takes, and where its recordings go.
+fn blackbox(setup: &Setup) -> Finding {
+    let settings = &setup.file.blackbox;
+    if !settings.enabled {
+        return finding(
+            "black box",
+            Status::Warning,
+            "blackbox.enabled is false: nothing is kept",
+        );
+    }
+    let folder = settings.folder(&setup.path, &setup.file.graph.name);
+    let detail = format!(
+        "{} MiB of memory, recordings of at most {} MiB in {}",
+        settings.memory_mib,
+        settings.folder_mib,
+        folder.display()
+    );
+    match fs::create_dir_all(&folder) {
+        Ok(()) => finding("black box", Status::Ok, detail),
+        Err(error) => finding("black box", Status::Failure, format!("{detail}: {error}")),
     }
 }
 

@@ -36,6 +36,8 @@ struct ListedGraph {
     launcher: Option<u32>,
     /// Its services, as their launcher has listed them last.
     services: Vec<ListedService>,
+    /// Process id of its black box; null if it has none.
+    blackbox: Option<u32>,
     /// Since its start, s.
     up_s: Option<f64>,
     /// Where its configuration was read from; null for `check-publisher` and `record`, which listen
@@ -97,6 +99,7 @@ fn listed(name: &str) -> Option<ListedGraph> {
         name: name.to_owned(),
         launcher: processes.launcher,
         services: services.collect(),
+        blackbox: processes.blackbox,
         up_s: up.and_then(Result::ok).map(|up| up.as_secs_f64().round()),
         config: setup.as_ref().map(|setup| setup.path.display().to_string()),
         rate_hz: setup.map(|setup| setup.file.graph.rate_hz),
@@ -163,6 +166,7 @@ mod tests {
                 pid: 7,
                 lives: false,
             }],
+            blackbox: None,
             up_s: Some(62.0),
             config: config.map(str::to_owned),
             rate_hz: Some(100.0),

@@ -20,6 +20,7 @@ mod record;
 mod run;
 mod schemas;
 mod shell;
+mod snapshot;
 mod status;
 mod stop;
 mod top;
@@ -54,6 +55,7 @@ enum Command {
     Ack(faults::AckArgs),
     Clear(faults::ClearArgs),
     Inject(inject::Args),
+    Snapshot(snapshot::Args),
     Check(check::Args),
     #[command(mut_args(only_of_the_border))]
     CheckPublisher(check_publisher::Args),
@@ -97,6 +99,7 @@ fn main() -> ExitCode {
         Command::Ack(args) => faults::acknowledge(&args),
         Command::Clear(args) => faults::clear(&args),
         Command::Inject(args) => inject::run(&args),
+        Command::Snapshot(args) => snapshot::run(&args),
         Command::Record(args) => record::run(&args),
         Command::PrintChannels(args) => print_channels::run(&args),
         Command::PrintTypes(args) => print_types::run(&args),

@@ -62,8 +62,11 @@ fn stop_services(domain: &Domain) -> Result<(), CommandError> {
         let message = "somebody has just taken it over: try again";
         return Err(CommandError::failure(message));
     };
-    let listed = domain.processes().services.into_iter().rev();
-    let services = listed.filter_map(|(_, pid)| domain.find_process(pid));
+    let listed = domain.processes();
+    let services = listed.services.into_iter().rev().map(|(_, pid)| pid);
+    // Last: it records how they ended.
+    let pids = services.chain(listed.blackbox);
+    let services = pids.filter_map(|pid| domain.find_process(pid));
     let services: Vec<FoundProcess> = services.collect();
     for service in &services {
         service.terminate();

@@ -47,7 +47,7 @@ fn follow(command: &[String], folder: &Path) -> Output {
             let last = script.lines().last().unwrap();
             assert_eq!(last, "exec \"$root/target/release/vigil\" run \"$@\"");
             let graph = format!("t{}-your-robot", std::process::id());
-            let more = ["--json".to_owned(), "--graph".to_owned(), graph];
+            let more = ["--json", "--no-blackbox", "--graph", &graph].map(str::to_owned);
             (vigil.with_file_name("vigil-launcher"), more.to_vec())
         }
         other => panic!("what is {other}?"),

@@ -1,0 +1,103 @@
+//! The black box: an observer beside the services. The graph drives on without it.
+
+use std::time::{Duration, Instant};
+
+use vigil_cycle::{Domain, FoundProcess};
+
+use crate::plan::{CommandLine, Plan};
+use crate::process::Process;
+use crate::restarts::{Death, RestartHistory};
+
+/// Time that it may take to finish a recording when the graph ends: the memory's content, written
+/// to a slow disk.
+const STOP_LIMIT: Duration = Duration::from_secs(20);
+/// Time that a killed one may take to be gone.
+const KILL_LIMIT: Duration = Duration::from_secs(1);
+
+/// The black box of a graph, started and restarted like a service; when it is given up, that is
+/// said, and the graph goes on.
+pub struct Companion {
+    process: Option<Process>,
+    history: RestartHistory,
+    restart_at: Option<Instant>,
+}
+
+impl Companion {
+    /// Starts it, or takes over the one that was `found`; none if the configuration wants none.
+    pub fn start(plan: &Plan, domain: &Domain, found: Option<FoundProcess>) -> Self {
+        let mut companion = Self {
+            process: found.map(Process::found),
+            history: RestartHistory::new(plan.restart_policy()),
+            restart_at: None,
+        };
+        if companion.process.is_none() && plan.setup.file.blackbox.enabled {
+            companion.spawn(plan, domain);
+        }
+        companion
+    }
+
+    /// Its process, while there is one.
+    pub fn id(&self) -> Option<u32> {
+        self.process.as_ref().map(Process::id)
+    }
+
+    /// Restarts it if it has died; true if its process is another one now.
+    pub fn look_after(&mut self, plan: &Plan, domain: &Domain) -> bool {
+        let now = Instant::now();
+        if let Some(ending) = self.process.as_mut().and_then(Process::ended) {
+            self.process = None;
+            let death = Death {
+                code: ending.code(),
+                failure: None,
+                can_resume: true,
+            };
+            match self.history.judge(&death, now) {
+                Ok(delay) => {
+                    tell!("vigil: the black box ended ({ending}); restarting");
+                    self.restart_at = Some(now + delay);
+                }
+                Err(reason) => tell!(
+                    "vigil: the black box ended ({ending}); given up: {reason}; nothing is \
+                     recorded any more"
+                ),
+            }
+        }
+        let is_due = self.restart_at.is_some_and(|at| now >= at);
+        if is_due {
+            self.restart_at = None;
+            self.history.restarted(now);
+            self.spawn(plan, domain);
+        }
+        is_due
+    }
+
+    fn spawn(&mut self, plan: &Plan, domain: &Domain) {
+        let command = CommandLine {
+            program: plan.programs.join("vigil-blackbox"),
+            options: vec!["--graph".to_owned(), domain.graph().to_owned()],
+        };
+        match Process::start(command) {
+            Ok(process) => self.process = Some(process),
+            Err(error) => tell!("vigil: nothing is recorded: {error}"),
+        }
+    }
+
+    /// Lets it finish what it writes, and ends it.
+    pub fn stop(&mut self) {
+        let Some(process) = &mut self.process else {
+            return;
+        };
+        process.terminate();
+        if !process.wait(STOP_LIMIT) {
+            tell!("vigil: the black box did not stop: killed");
+            process.kill();
+            process.wait(KILL_LIMIT);
+        }
+    }
+}
+
+impl Drop for Companion {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}

@@ -1,0 +1,167 @@
+"""What the black box has written is read by others' readers: what was measured, believed and done before an alarm."""
+
+import json
+import os
+import pathlib
+import signal
+import tempfile
+import time
+import unittest
+
+from harness import WATCHDOG_S, Graph, events, vigil
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+WHEELS = ["LF", "LM", "LR", "RF", "RM", "RR"]
+
+
+class Flight:
+    """A recording, decoded by the readers of ROS 2's format."""
+
+    def __init__(self, path):
+        self.messages, self.raw, self.topics = {}, {}, set()
+        with open(path, "rb") as file:
+            reader = make_reader(file, decoder_factories=[DecoderFactory()])
+            self.header = reader.get_header()
+            for schema, channel, message in reader.iter_messages():
+                self.topics.add(channel.topic)
+                if channel.message_encoding != "cdr":
+                    self.raw.setdefault(channel.topic, []).append(message)
+        with open(path, "rb") as file:
+            reader = make_reader(file, decoder_factories=[DecoderFactory()])
+            cdr = {topic for topic in self.topics if topic not in self.raw}
+            for decoded in reader.iter_decoded_messages(topics=cdr):
+                entry = decoded.message.log_time, decoded.decoded_message
+                self.messages.setdefault(decoded.channel.topic, []).append(entry)
+            self.attachments = {attachment.name: attachment.data for attachment in reader.iter_attachments()}
+            self.about = {entry.name: entry.metadata for entry in reader.iter_metadata()}
+
+    def last(self, topic):
+        return self.messages[topic][-1][1]
+
+    def named(self, topic):
+        """The last values of a topic that has names for them."""
+        message = self.last(topic)
+        return dict(zip(message.name, message.position))
+
+
+def wait_for(look, what):
+    until = time.monotonic() + WATCHDOG_S
+    while time.monotonic() < until:
+        found = look()
+        if found:
+            return found
+        time.sleep(0.05)
+    raise TimeoutError(what)
+
+
+class BlackBox(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def recordings(self, reason):
+        return sorted(self.folder.glob(f"*-{reason}.mcap"))
+
+    def blackbox(self, graph):
+        """Its process id."""
+        listed = json.loads(vigil("list", "--json").stdout)["graphs"]
+        return next((of["blackbox"] for of in listed if of["name"] == graph.name), None)
+
+    def test_an_alarm_is_written_with_what_was_before_and_after_it(self):
+        with Graph("--inject", "stuck:RM@4", "--duration", "60", recordings=self.folder) as graph:
+            [path] = wait_for(lambda: self.recordings("alarm"), "a recording")
+            summary = graph.stop()
+        flight = Flight(path)
+        self.assertEqual(flight.header.profile, "ros2")
+        alarm = next(event for event in summary["events"] if event["event"] == "alarm")
+        self.assertGreater(alarm["t_s"], 4)
+        self.assertEqual(events(summary, "diagnosis")[0], "RM_STUCK")
+
+        # Each frame, with the wheel that stands still since the fault.
+        wheels = flight.last("/joint_states")
+        speed = dict(zip(wheels.name, wheels.velocity))
+        moving = [speed[name] for name in speed if name[:2] in WHEELS and abs(speed[name]) > 0.1]
+        self.assertGreaterEqual(len(moving), 5, speed)
+        times = [log_time for log_time, _ in flight.messages["/joint_states"]]
+        self.assertEqual(times, sorted(times))
+        self.assertGreater(times[-1] - times[0], 3.5e9)
+        frames = flight.raw["/vigil/raw/sensor"]
+        self.assertEqual(len(frames), len(times))
+        numbers = [frame.sequence for frame in frames]
+        self.assertEqual(numbers, list(range(numbers[0], numbers[0] + len(numbers))), "no frame is missing")
+
+        # Beliefs have names.
+        belief = flight.named("/vigil/belief")
+        self.assertGreater(belief["RM_STUCK"], 0.9, belief)
+        before = flight.messages["/vigil/belief"][0][1]
+        self.assertGreater(dict(zip(before.name, before.position))["ND"], 0.9)
+        levels = {status.name: status.level for status in flight.last("/diagnostics").status}
+        self.assertTrue(any("RM_STUCK" in name for name in levels), levels)
+        actions = [message.data for _, message in flight.messages["/vigil/action"]]
+        self.assertIn("compensate:RM", actions[-1])
+        told = [message.msg for _, message in flight.messages["/vigil/events"]]
+        self.assertTrue(any("alarm" in text for text in told), told)
+        self.assertEqual(flight.about["vigil"]["reason"], "alarm")
+        self.assertIn(b"rate_hz", flight.attachments["document.toml"])
+
+        # A second, independent reader.
+        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+            kinds = {"sensor_msgs/msg/JointState", "nav_msgs/msg/Odometry", "diagnostic_msgs/msg/DiagnosticArray"}
+            wanted = [one for one in reader.connections if one.msgtype in kinds]
+            self.assertGreater(len(wanted), 4)
+            count = 0
+            for connection, _, data in reader.messages(connections=wanted):
+                reader.deserialize(data, connection.msgtype)
+                count += 1
+            self.assertGreater(count, 3 * len(frames))
+
+    def test_what_is_asked_for_is_written(self):
+        with Graph("--duration", "60", recordings=self.folder) as graph:
+            graph.wait_until_up()
+            wait_for(lambda: self.blackbox(graph), "a black box")
+            said = wait_for(lambda: vigil("snapshot", "odd noise", "--graph", graph.name).stdout, "an answer")
+            self.assertEqual(said.strip(), str(self.folder))
+            [path] = wait_for(lambda: self.recordings("request"), "a recording")
+            graph.stop()
+        self.assertEqual(Flight(path).about["vigil"]["what"], "odd noise")
+
+    def test_a_black_box_that_is_killed_leaves_what_it_had_and_another_goes_on(self):
+        with Graph("--duration", "60", recordings=self.folder) as graph:
+            graph.wait_until_up()
+            first = wait_for(lambda: self.blackbox(graph), "a black box")
+            ring = graph.wait_until_up() / "ring"
+            wait_for(lambda: ring.exists() and "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            killed_ns = time.time_ns()
+            os.kill(first, signal.SIGKILL)
+            second = wait_for(lambda: self.blackbox(graph) not in (None, first) and self.blackbox(graph), "another")
+            self.assertNotEqual(second, first)
+            [path] = wait_for(lambda: self.recordings("crash"), "a recording")
+            summary = graph.stop()
+        times = [log_time for log_time, _ in Flight(path).messages["/joint_states"]]
+        # To the last second before it was killed.
+        self.assertGreater(times[-1], killed_ns - 1e9)
+        self.assertGreater(times[-1] - times[0], 1e9)
+        self.assertEqual([service["restarts"] for service in summary["services"].values()], [0, 0, 0, 0])
+
+    def test_a_service_that_is_killed_is_a_crash(self):
+        with Graph("--duration", "60", recordings=self.folder) as graph:
+            graph.wait_until_up()
+            wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            listed = json.loads(vigil("list", "--json").stdout)["graphs"]
+            services = next(of["services"] for of in listed if of["name"] == graph.name)
+            detector = next(of["pid"] for of in services if of["name"] == "detector")
+            os.kill(detector, signal.SIGKILL)
+            [path] = wait_for(lambda: self.recordings("crash"), "a recording")
+            graph.stop()
+        flight = Flight(path)
+        self.assertIn("detector", flight.about["vigil"]["what"])
+        writers = {message.data[8:16] for message in flight.raw["/vigil/raw/detection"]}
+        self.assertEqual(len(writers), 2, "both processes of the detector")
+
+
+if __name__ == "__main__":
+    unittest.main()
