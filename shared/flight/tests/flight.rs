@@ -1,5 +1,7 @@
 //! Files are written from blocks and read again.
 
+#![cfg(test)]
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
