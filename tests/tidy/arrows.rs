@@ -52,6 +52,7 @@ fn dependencies(table: &Table) -> Vec<String> {
 }
 
 const SHARED: &[&str] = &[
+    "vigil-flight",
     "vigil-timeline",
     "vigil-setup",
     "vigil-cycle",
@@ -120,6 +121,16 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "vigil-timeline",
         &["vigil-setup", "vigil-cycle", "vigil-robot", "vigil-blocks"],
+    ),
+    (
+        "vigil-flight",
+        &[
+            "vigil-timeline",
+            "vigil-setup",
+            "vigil-cycle",
+            "vigil-robot",
+            "vigil-blocks",
+        ],
     ),
     (
         "vigil-recording",

@@ -20,14 +20,17 @@ const CHUNK_NS: u64 = 1_000_000_000;
 /// Size from which a chunk is closed, bytes.
 const CHUNK_BYTES: usize = 1 << 20;
 
-/// The encoding of a channel's messages, with what describes them.
-pub(crate) struct ChannelForm<'a> {
-    /// Name of the messages' type.
-    pub(crate) schema: &'a str,
-    /// Form of the description.
-    pub(crate) schema_encoding: &'a str,
-    /// How messages are encoded.
-    pub(crate) message_encoding: &'a str,
+/// What the messages of a channel are.
+pub(crate) struct ChannelForm {
+    /// How they are encoded.
+    pub(crate) message_encoding: &'static str,
+    /// Name of their type; empty if it has none.
+    pub(crate) type_name: &'static str,
+    /// What the type consists of, in the words of ROS 2; empty for other messages. Readers of ROS 2
+    /// refuse a whole file for one definition in words that they do not know.
+    pub(crate) definition: String,
+    /// What else there is to know, by name.
+    pub(crate) notes: BTreeMap<String, String>,
 }
 
 /// A channel of the file.
@@ -120,28 +123,27 @@ impl Container {
         let mut cdr = std::mem::replace(&mut self.cdr, Cdr::new());
         cdr.clear();
         message.encode(&mut cdr);
-        let form = ChannelForm {
-            schema: M::DEFINITION.name,
-            schema_encoding: "ros2msg",
+        let form = || ChannelForm {
             message_encoding: "cdr",
+            type_name: M::DEFINITION.name,
+            definition: M::DEFINITION.text(),
+            notes: BTreeMap::new(),
         };
-        let text = || M::DEFINITION.text();
-        let written = self.write_bytes(topic, times, cdr.bytes(), &form, text);
+        let written = self.write_bytes(topic, times, cdr.bytes(), form);
         self.cdr = cdr;
         written
     }
 
-    /// Writes a message of any form; `schema_text` describes it, where the channel is a new one.
+    /// Writes a message of any form; `form` is asked for if the channel is a new one.
     pub(crate) fn write_bytes(
         &mut self,
         topic: &str,
         times: MessageTimes,
         bytes: &[u8],
-        form: &ChannelForm,
-        schema_text: impl FnOnce() -> String,
+        form: impl FnOnce() -> ChannelForm,
     ) -> Result<(), FlightError> {
         if !self.channels.contains_key(topic) {
-            let added = self.add_channel(topic, form, &schema_text());
+            let added = self.add_channel(topic, &form());
             let id = added.map_err(|source| self.container_error(source))?;
             let channel = Channel { id, count: 0 };
             self.channels.insert(topic.to_owned(), channel);
@@ -165,23 +167,22 @@ impl Container {
         Ok(())
     }
 
-    fn add_channel(
-        &mut self,
-        topic: &str,
-        form: &ChannelForm,
-        schema_text: &str,
-    ) -> Result<u16, McapError> {
+    fn add_channel(&mut self, topic: &str, form: &ChannelForm) -> Result<u16, McapError> {
+        let encoding = if form.definition.is_empty() {
+            ""
+        } else {
+            "ros2msg"
+        };
         // Number 0 is that of no schema.
-        let schema = match form.schema_encoding {
+        let schema = match form.type_name {
             "" => 0,
-            encoding => {
-                let text = schema_text.as_bytes();
-                self.writer.add_schema(form.schema, encoding, text)?
+            name => {
+                let definition = form.definition.as_bytes();
+                self.writer.add_schema(name, encoding, definition)?
             }
         };
-        let encoding = form.message_encoding;
         self.writer
-            .add_channel(schema, topic, encoding, &BTreeMap::new())
+            .add_channel(schema, topic, form.message_encoding, &form.notes)
     }
 
     /// Closes the chunk if it is large, or if this instant lies too far from its beginning.

@@ -16,9 +16,6 @@ use crate::message_times::MessageTimes;
 use crate::summary::FlightSummary;
 use crate::translation::{Outcome, Translation, write_event, write_truth};
 
-/// Encoding of raw blocks: their bytes, little endian, without padding.
-const BLOCK_ENCODING: &str = "vigil-block";
-
 /// Writes what a graph published as an MCAP file.
 ///
 /// The file has `.part` after its name until [`Self::finish`]. What was written up to the last
@@ -44,6 +41,16 @@ fn layout_text<B: Block + Layout>() -> String {
         format!("{} {}: {}\n", field.offset, field.name, field.type_text)
     };
     head + &B::FIELDS.iter().map(line).collect::<String>()
+}
+
+/// Channels of raw blocks: their bytes, little endian, without padding.
+const fn block_form(type_name: &'static str, notes: BTreeMap<String, String>) -> ChannelForm {
+    ChannelForm {
+        message_encoding: "vigil-block",
+        type_name,
+        definition: String::new(),
+        notes,
+    }
 }
 
 /// The header of a block of this type; `None` if the bytes are something else.
@@ -146,25 +153,16 @@ impl FlightWriter {
         let Some(header) = header::<B>(bytes) else {
             // Nothing says when it was, so it is put after what came before it.
             let times = MessageTimes::at(self.file.last_ns().unwrap_or_else(unix_now_ns));
-            let form = ChannelForm {
-                schema: "",
-                schema_encoding: "",
-                message_encoding: BLOCK_ENCODING,
-            };
             let topic = format!("/vigil/foreign/{name}");
-            self.file
-                .write_bytes(&topic, times, bytes, &form, String::new)?;
+            let form = || block_form("", BTreeMap::new());
+            self.file.write_bytes(&topic, times, bytes, form)?;
             return Ok(None);
         };
         let times = MessageTimes::new(&header, &self.clock);
-        let form = ChannelForm {
-            schema: B::TYPE_NAME,
-            schema_encoding: BLOCK_ENCODING,
-            message_encoding: BLOCK_ENCODING,
-        };
         let topic = format!("/vigil/raw/{name}");
-        self.file
-            .write_bytes(&topic, times, bytes, &form, layout_text::<B>)?;
+        let layout = || BTreeMap::from([("layout".to_owned(), layout_text::<B>())]);
+        let form = || block_form(B::TYPE_NAME, layout());
+        self.file.write_bytes(&topic, times, bytes, form)?;
         Ok(Some(times))
     }
 

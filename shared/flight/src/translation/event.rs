@@ -1,5 +1,7 @@
 //! Events in words, as lines of a log and as JSON.
 
+use std::collections::BTreeMap;
+
 use vigil_blocks::EventKind;
 use vigil_timeline::{TimelineEntry, WallClock};
 
@@ -11,9 +13,6 @@ use crate::messages::log::{LogLevel, LogLine};
 
 /// Codes of kinds, some of which no kind has.
 const CODES: std::ops::Range<u32> = 0..256;
-
-/// Any object: viewers find the fields themselves.
-const JSON_SCHEMA: &str = r#"{"title":"vigil.TimelineEntry","type":"object"}"#;
 
 fn level(name: &str) -> LogLevel {
     use EventKind as K;
@@ -64,13 +63,11 @@ pub(crate) fn write_event(
     file.write("/vigil/events", times, &line)?;
     // An entry is made of numbers and texts, which always have a form in JSON.
     let json = serde_json::to_vec(entry).unwrap_or_default();
-    let form = ChannelForm {
-        schema: "vigil.TimelineEntry",
-        schema_encoding: "jsonschema",
+    file.write_bytes("/vigil/raw/events", times, &json, || ChannelForm {
         message_encoding: "json",
-    };
-    file.write_bytes("/vigil/raw/events", times, &json, &form, || {
-        JSON_SCHEMA.to_owned()
+        type_name: "",
+        definition: String::new(),
+        notes: BTreeMap::new(),
     })
 }
 
