@@ -107,7 +107,16 @@ impl Recording {
         let (material, shared) = (Arc::clone(material), Arc::clone(&orders));
         Self {
             orders,
-            thread: thread::spawn(move || write(&material, ring, &order, &shared)),
+            thread: thread::spawn(move || {
+                // What it will take at least, so that the bound holds while it is written.
+                material.folder.prune(material.running.setup.file.blackbox.memory_bytes());
+                let written = write(&material, ring, &order, &shared);
+                if written.is_err() {
+                    material.folder.adopt_parts();
+                }
+                material.folder.prune(0);
+                written
+            }),
         }
     }
 
@@ -191,33 +200,35 @@ fn write(
         .lock()
         .map_or_else(|_| Vec::new(), |causes| causes.clone());
     causes.sort();
-    let told = causes
-        .iter()
-        .map(|cause| format!("{} {}", clock.rfc3339(cause.t_ns), cause.text));
-    let told: Vec<String> = told.collect();
     let gravest = causes.first().unwrap_or(&order.cause);
-    let about = [
-        ("graph", graph.to_owned()),
-        ("reason", gravest.reason.to_string()),
-        ("what", gravest.text.clone()),
-        ("when", clock.rfc3339(gravest.t_ns)),
-        ("causes", told.join("\n")),
-        ("gaps", ring.overtaken().to_string()),
-        ("lost_before", lost_before.to_string()),
-        (
-            "lost",
-            (lost.load(Ordering::Relaxed) - lost_before).to_string(),
-        ),
-        ("config_hash", format!("{:016x}", running.setup.hash)),
-    ];
-    let about = about.map(|(key, value)| (key.to_owned(), value));
-    file.metadata("vigil", &BTreeMap::from(about))?;
+    let mut about = about(material, gravest, &causes);
+    about.insert("gaps".into(), ring.overtaken().to_string());
+    let lost = lost.load(Ordering::Relaxed) - lost_before;
+    about.insert("lost".into(), lost.to_string());
+    file.metadata("vigil", &about)?;
     file.finish()?;
-    folder.prune(0);
     // The gravest cause names it.
     let named = name(gravest);
     Ok(match std::fs::rename(&path, &named) {
         Ok(()) => named,
         Err(_) => path,
     })
+}
+
+/// What is said of a recording beside its messages.
+fn about(material: &Material, gravest: &Cause, causes: &[Cause]) -> BTreeMap<String, String> {
+    let Material { running, clock, .. } = material;
+    let told = causes.iter();
+    let told = told.map(|cause| format!("{} {}", clock.rfc3339(cause.t_ns), cause.text));
+    let told: Vec<String> = told.collect();
+    let about = [
+        ("graph", running.domain.graph().to_owned()),
+        ("reason", gravest.reason.to_string()),
+        ("what", gravest.text.clone()),
+        ("when", clock.rfc3339(gravest.t_ns)),
+        ("causes", told.join("\n")),
+        ("config_hash", format!("{:016x}", running.setup.hash)),
+    ];
+    let about = about.map(|(key, value)| (key.to_owned(), value));
+    BTreeMap::from(about)
 }

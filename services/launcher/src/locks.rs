@@ -2,8 +2,7 @@
 
 use std::io;
 
-use vigil_cycle::domain::GraphLock;
-use vigil_cycle::{Domain, LauncherLock};
+use vigil_cycle::{Domain, GraphLock, LauncherLock};
 
 /// The two locks of a graph that is looked after.
 #[derive(Debug)]

@@ -1,11 +1,9 @@
 //! Where a graph lives on a machine: runtime folder, shared-memory prefix, and its lock.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io;
-use std::os::fd::AsRawFd;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use iceoryx2::prelude::{Config, FileName, SemanticString};
 use schemars::JsonSchema;
@@ -26,11 +24,6 @@ const SENSOR_BUFFERS: usize = 8;
 /// Characters of a start's name, and how many there are.
 const START_DIGITS: &[u8; 62] = b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz";
 const START_LENGTH: usize = 3;
-/// A publisher that asks whether a graph runs holds its lock for some microseconds.
-const LOCK_ATTEMPTS: usize = 3;
-/// Time between two attempts.
-const LOCK_PAUSE: Duration = Duration::from_millis(5);
-
 /// Blocks that a reader may hold at once: the one it works on, and the next.
 pub(crate) const BORROWED: usize = 2;
 /// Blocks that a writer may hold at once: the one it fills, and one more while that is sent.
@@ -61,32 +54,6 @@ pub struct Domain {
     graph: String,
     folder: PathBuf,
     queues: Queues,
-}
-
-/// Holds the right to run a graph; released when dropped or when the process dies, and the
-/// processes that inherited it as well.
-#[derive(Debug)]
-pub struct GraphLock {
-    file: File,
-}
-
-impl GraphLock {
-    /// Lets the children that are started from now on hold the lock too: should the launcher die,
-    /// its services drive on, and nobody can start a second graph over them.
-    pub fn share_with_children(&self) {
-        // SAFETY: the descriptor is open as long as self lives; only its close-on-exec flag
-        // changes.
-        #[allow(unsafe_code)]
-        unsafe {
-            libc::fcntl(self.file.as_raw_fd(), libc::F_SETFD, 0);
-        }
-    }
-
-    /// Holds the lock from now on, if no process holds it that was started by another launcher.
-    /// Children that share this lock then hold it as well.
-    pub fn take_over(&self) {
-        let _ = self.file.try_lock();
-    }
 }
 
 impl Domain {
@@ -293,26 +260,7 @@ impl Domain {
         Ok(config)
     }
 
-    /// Takes the right to run this graph; `None` if another launcher holds it.
-    ///
-    /// # Errors
-    /// The file system's.
-    pub fn lock(&self) -> io::Result<Option<GraphLock>> {
-        let file = open_to_lock(&self.lock_file())?;
-        Ok(lock_soon(&file)?.then_some(GraphLock { file }))
-    }
-
-    /// The lock of a graph whose services hold it, for a launcher that adopts them: see
-    /// [`GraphLock::take_over`].
-    ///
-    /// # Errors
-    /// The file system's.
-    pub fn adopt_lock(&self) -> io::Result<GraphLock> {
-        let file = open_to_lock(&self.lock_file())?;
-        Ok(GraphLock { file })
-    }
-
-    /// File of [`GraphLock`].
+    /// File of [`crate::GraphLock`].
     pub(crate) fn lock_file(&self) -> PathBuf {
         self.folder.join("lock")
     }
@@ -394,25 +342,6 @@ fn collect_files(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Opens a file that is only there to be locked.
-pub(crate) fn open_to_lock(path: &Path) -> io::Result<File> {
-    let mut options = OpenOptions::new();
-    options.create(true).truncate(false).write(true).mode(0o600);
-    options.open(path)
-}
-
-/// Locks a file; false if it is held for longer than a look at it takes.
-pub(crate) fn lock_soon(file: &File) -> io::Result<bool> {
-    for _ in 0..LOCK_ATTEMPTS {
-        match file.try_lock() {
-            Ok(()) => return Ok(true),
-            Err(fs::TryLockError::WouldBlock) => std::thread::sleep(LOCK_PAUSE),
-            Err(fs::TryLockError::Error(error)) => return Err(error),
-        }
-    }
-    Ok(false)
-}
-
 /// `/run/vigil` where the user may write there, else the user's own runtime folder. Short, since
 /// socket paths are limited to 108 bytes.
 fn runtime_folder() -> PathBuf {
@@ -444,6 +373,8 @@ fn tempfile_works(folder: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
 
     #[test]

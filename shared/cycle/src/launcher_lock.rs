@@ -4,7 +4,8 @@ use std::fs::{self, File, TryLockError};
 use std::io::{self, Seek, Write};
 use std::path::PathBuf;
 
-use crate::domain::{Domain, lock_soon, open_to_lock};
+use crate::domain::Domain;
+use crate::graph_lock::{lock_soon, open_to_lock};
 use crate::topic::ServiceName;
 
 /// Held by the launcher of a graph alone, as long as it lives: services do not inherit it. Its file

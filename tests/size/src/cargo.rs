@@ -7,12 +7,13 @@ use std::process::Command;
 use crate::source::root;
 
 /// The programs that run on a robot.
-const PROGRAMS: [&str; 5] = [
+const PROGRAMS: [&str; 6] = [
     "vigil-sensor-sim",
     "vigil-detector",
     "vigil-identifier",
     "vigil-supervisor",
     "vigil-launcher",
+    "vigil-blackbox",
 ];
 
 /// A crate of the workspace that a program on the robot links.
