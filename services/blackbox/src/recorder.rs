@@ -109,7 +109,9 @@ impl Recording {
             orders,
             thread: thread::spawn(move || {
                 // What it will take at least, so that the bound holds while it is written.
-                material.folder.prune(material.running.setup.file.blackbox.memory_bytes());
+                material
+                    .folder
+                    .prune(material.running.setup.file.blackbox.memory_bytes());
                 let written = write(&material, ring, &order, &shared);
                 if written.is_err() {
                     material.folder.adopt_parts();
