@@ -64,7 +64,7 @@ class BlackBox(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
 
     def recordings(self, reason):
-        return sorted(self.folder.glob(f"*-{reason}.mcap"))
+        return sorted(self.folder.glob(f"*/*-{reason}.mcap"))
 
     def blackbox(self, graph):
         """Its process id."""
@@ -73,7 +73,7 @@ class BlackBox(unittest.TestCase):
 
     def test_an_alarm_is_written_with_what_was_before_and_after_it(self):
         with Graph("--inject", "stuck:RM@4", "--duration", "60", recordings=self.folder) as graph:
-            [path] = wait_for(lambda: self.recordings("alarm"), "a recording")
+            path, *_ = wait_for(lambda: self.recordings("alarm"), "a recording")
             summary = graph.stop()
         flight = Flight(path)
         self.assertEqual(flight.header.profile, "ros2")
@@ -124,8 +124,8 @@ class BlackBox(unittest.TestCase):
             graph.wait_until_up()
             wait_for(lambda: self.blackbox(graph), "a black box")
             said = wait_for(lambda: vigil("snapshot", "odd noise", "--graph", graph.name).stdout, "an answer")
-            self.assertEqual(said.strip(), str(self.folder))
-            [path] = wait_for(lambda: self.recordings("request"), "a recording")
+            self.assertEqual(said.strip(), str(self.folder / graph.name))
+            path, *_ = wait_for(lambda: self.recordings("request"), "a recording")
             graph.stop()
         self.assertEqual(Flight(path).about["vigil"]["what"], "odd noise")
 
@@ -139,7 +139,7 @@ class BlackBox(unittest.TestCase):
             os.kill(first, signal.SIGKILL)
             second = wait_for(lambda: self.blackbox(graph) not in (None, first) and self.blackbox(graph), "another")
             self.assertNotEqual(second, first)
-            [path] = wait_for(lambda: self.recordings("crash"), "a recording")
+            path, *_ = wait_for(lambda: self.recordings("crash"), "a recording")
             summary = graph.stop()
         times = [log_time for log_time, _ in Flight(path).messages["/joint_states"]]
         # To the last second before it was killed.
@@ -155,7 +155,7 @@ class BlackBox(unittest.TestCase):
             services = next(of["services"] for of in listed if of["name"] == graph.name)
             detector = next(of["pid"] for of in services if of["name"] == "detector")
             os.kill(detector, signal.SIGKILL)
-            [path] = wait_for(lambda: self.recordings("crash"), "a recording")
+            path, *_ = wait_for(lambda: self.recordings("crash"), "a recording")
             graph.stop()
         flight = Flight(path)
         self.assertIn("detector", flight.about["vigil"]["what"])

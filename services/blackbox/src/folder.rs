@@ -1,80 +1,131 @@
-//! The folder of the recordings: names, and a bound on their sum.
+//! The folder of a graph's recordings: names, and a bound on their sum.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 /// How a recording ends that is not finished.
-const PART: &str = "part";
+const PART: &str = ".mcap.part";
 /// How one ends that is.
-const WHOLE: &str = "mcap";
+const WHOLE: &str = ".mcap";
+/// How one ends that nothing but missed cycles is the reason of.
+const MISS: &str = "-miss.mcap";
 
-/// A folder of recordings of bounded size.
+/// A graph's folder of recordings, of bounded size. Other files in it are nobody's business here.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordingsFolder {
     path: PathBuf,
+    graph: String,
     bytes_max: u64,
 }
 
 impl RecordingsFolder {
-    /// The folder at `path`, made if it is not there.
+    /// The first of these folders in which files can be made.
     ///
     /// # Errors
-    /// The system's.
-    pub fn open(path: PathBuf, bytes_max: u64) -> io::Result<Self> {
-        fs::create_dir_all(&path)?;
-        Ok(Self { path, bytes_max })
+    /// The system's, of the last.
+    pub fn open(candidates: &[PathBuf], graph: &str, bytes_max: u64) -> io::Result<Self> {
+        let mut result = Err(io::Error::other("no folder for recordings is given"));
+        for path in candidates {
+            result = writable(path).map(|()| Self {
+                path: path.clone(),
+                graph: graph.to_owned(),
+                bytes_max,
+            });
+            if result.is_ok() {
+                break;
+            }
+        }
+        result
+    }
+
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// A new recording's path: graph, time (RFC 3339) and reason.
-    pub fn name(&self, graph: &str, rfc3339: &str, reason: &str) -> PathBuf {
+    pub fn name(&self, rfc3339: &str, reason: &str) -> PathBuf {
         // Colons cannot stand in names everywhere.
         let time: String = rfc3339.chars().filter(|c| !":-".contains(*c)).collect();
-        self.path.join(format!("{graph}-{time}-{reason}.{WHOLE}"))
+        let graph = &self.graph;
+        self.path.join(format!("{graph}-{time}-{reason}{WHOLE}"))
     }
 
     /// Gives recordings a proper name that a process has left unfinished: they can be read as far
-    /// as they go.
+    /// as they go. Nobody may be writing.
     pub fn adopt_parts(&self) -> Vec<PathBuf> {
-        let parts = self.files(PART).into_iter().filter_map(|file| {
-            let whole = file.path.with_extension("");
-            let stem = whole.file_stem()?.to_str()?;
-            let cut = whole.with_file_name(format!("{stem}-cut.{WHOLE}"));
-            fs::rename(&file.path, &cut).ok()?;
-            Some(cut)
-        });
-        parts.collect()
+        let parts = self.files(PART).into_iter();
+        parts.filter_map(|part| adopt(&part.path)).collect()
     }
 
-    /// Removes the oldest recordings until the others, and `more` bytes, are within the bound.
+    /// Removes recordings until the others, and `more` bytes, are within the bound: those that
+    /// only missed cycles are the reason of first, the oldest first. The newest stays.
     pub fn prune(&self, more: u64) {
         let mut files = self.files(WHOLE);
         files.sort_by(|a, b| (a.modified, &a.path).cmp(&(b.modified, &b.path)));
-        let mut sum = files.iter().map(|file| file.bytes).sum::<u64>() + more;
+        let mut sum = more;
+        for file in &files {
+            sum = sum.saturating_add(file.bytes);
+        }
+        files.pop();
+        files.sort_by_key(|file| !file.path.to_string_lossy().ends_with(MISS));
         for file in &files {
             if sum <= self.bytes_max {
                 break;
             }
             if fs::remove_file(&file.path).is_ok() {
-                sum -= file.bytes;
+                sum = sum.saturating_sub(file.bytes);
             }
         }
     }
 
-    fn files(&self, extension: &str) -> Vec<RecordingFile> {
+    /// The graph's own files that end so.
+    fn files(&self, ending: &str) -> Vec<RecordingFile> {
         let entries = fs::read_dir(&self.path).into_iter().flatten().flatten();
+        let begin = format!("{}-", self.graph);
         let files = entries.filter_map(|entry| {
             let (path, metadata) = (entry.path(), entry.metadata().ok()?);
-            let is_kind = path.extension().is_some_and(|of| of == extension);
-            is_kind.then_some(RecordingFile {
-                path,
+            let name = path.file_name()?.to_str()?;
+            // After the graph's name comes the time: `rover-2` has no files of `rover`.
+            let time = name.strip_prefix(&begin)?.strip_suffix(ending)?;
+            let is_time = time.len() > 20 && time.as_bytes()[..8].iter().all(u8::is_ascii_digit);
+            is_time.then_some(RecordingFile {
                 bytes: metadata.len(),
                 modified: metadata.modified().ok()?,
+                path,
             })
         });
         files.collect()
     }
+}
+
+/// Gives an unfinished recording a proper name; one without content is removed.
+pub fn adopt(part: &Path) -> Option<PathBuf> {
+    if fs::metadata(part).is_ok_and(|metadata| metadata.len() == 0) {
+        let _ = fs::remove_file(part);
+        return None;
+    }
+    let name = part.file_name()?.to_str()?.strip_suffix(PART)?;
+    let cut = part.with_file_name(format!("{name}-cut{WHOLE}"));
+    fs::rename(part, &cut).ok()?;
+    Some(cut)
+}
+
+/// The unfinished form of a recording.
+pub fn part_of(whole: &Path) -> PathBuf {
+    let mut part = whole.as_os_str().to_owned();
+    part.push(".part");
+    part.into()
+}
+
+/// Makes the folder, and a file in it for a moment.
+fn writable(folder: &Path) -> io::Result<()> {
+    fs::create_dir_all(folder)?;
+    let probe = folder.join(format!(".probe-{}", std::process::id()));
+    File::create(&probe)?;
+    fs::remove_file(probe)
 }
 
 struct RecordingFile {
@@ -88,49 +139,83 @@ mod tests {
     use super::*;
     use std::time::Duration;
 
+    fn folder(path: &Path, bytes_max: u64) -> RecordingsFolder {
+        RecordingsFolder::open(&[path.to_owned()], "rover", bytes_max).unwrap()
+    }
+
+    fn left(folder: &RecordingsFolder) -> Vec<String> {
+        let names = fs::read_dir(folder.path()).unwrap();
+        let names = names.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = names.collect();
+        names.sort();
+        names
+    }
+
     #[test]
-    fn the_oldest_recordings_go_until_the_sum_is_within_the_bound() {
+    fn misses_go_first_then_the_oldest_and_the_newest_and_others_files_stay() {
         let temporary = tempfile::tempdir().unwrap();
-        let folder = RecordingsFolder::open(temporary.path().join("new"), 250).unwrap();
+        let folder = folder(&temporary.path().join("new"), 250);
+        let name = |time: &str, reason: &str| {
+            let path = folder.name(time, reason);
+            path.file_name().unwrap().to_str().unwrap().to_owned()
+        };
+        let old = name("2026-11-28T10:00:00.000Z", "alarm");
+        let miss = name("2026-11-28T11:00:00.000Z", "miss");
+        let new = name("2026-11-28T12:00:00.000Z", "crash");
         for (age_s, name) in [
-            (30, "b.mcap"),
-            (40, "a.mcap"),
-            (10, "c.mcap"),
-            (90, "other"),
+            (40, old.as_str()),
+            (30, &miss),
+            (10, &new),
+            (90, "mine.mcap"),
+            (90, "rover-2-20261128T100000.000Z-alarm.mcap"),
         ] {
-            let path = folder.path.join(name);
+            let path = folder.path().join(name);
             fs::write(&path, [0; 100]).unwrap();
             let then = SystemTime::now() - Duration::from_secs(age_s);
             let file = fs::File::options().write(true).open(path).unwrap();
             file.set_modified(then).unwrap();
         }
-        let left = || {
-            let names = fs::read_dir(&folder.path).unwrap();
-            let names = names.map(|entry| entry.unwrap().file_name().into_string().unwrap());
-            let mut names: Vec<String> = names.collect();
-            names.sort();
-            names
+        let others = ["mine.mcap", "rover-2-20261128T100000.000Z-alarm.mcap"];
+        let with_others = |own: &[&String]| {
+            let own = own.iter().map(|name| (*name).clone());
+            let mut all: Vec<String> = own.chain(others.map(str::to_owned)).collect();
+            all.sort();
+            all
         };
         folder.prune(0);
-        assert_eq!(left(), ["b.mcap", "c.mcap", "other"]);
+        assert_eq!(left(&folder), with_others(&[&old, &new]));
         folder.prune(100);
-        assert_eq!(left(), ["c.mcap", "other"]);
+        assert_eq!(left(&folder), with_others(&[&new]));
+        folder.prune(1000);
+        assert_eq!(left(&folder), with_others(&[&new]), "the newest stays");
     }
 
     #[test]
     fn what_was_left_unfinished_gets_a_name_that_says_so() {
         let temporary = tempfile::tempdir().unwrap();
-        let folder = RecordingsFolder::open(temporary.path().to_owned(), 1000).unwrap();
-        let name = folder.name("rover", "2026-11-28T18:00:01.250Z", "alarm");
-        assert!(
-            name.ends_with("rover-20261128T180001.250Z-alarm.mcap"),
-            "{name:?}"
-        );
-        let mut part = name.clone().into_os_string();
-        part.push(".part");
-        fs::write(part, "x").unwrap();
+        let folder = folder(temporary.path(), 1000);
+        let whole = folder.name("2026-11-28T18:00:01.250Z", "alarm");
+        let name = "rover-20261128T180001.250Z-alarm";
+        assert!(whole.ends_with(format!("{name}.mcap")), "{whole:?}");
+        fs::write(part_of(&whole), "x").unwrap();
+        let empty = folder.name("2026-11-28T18:00:02.250Z", "alarm");
+        fs::write(part_of(&empty), "").unwrap();
+        fs::write(folder.path().join("mine.mcap.part"), "x").unwrap();
         let adopted = folder.adopt_parts();
-        assert!(adopted[0].ends_with("rover-20261128T180001.250Z-alarm-cut.mcap"));
-        assert!(adopted[0].exists() && folder.adopt_parts().is_empty());
+        assert_eq!(adopted, [folder.path().join(format!("{name}-cut.mcap"))]);
+        assert_eq!(
+            left(&folder),
+            ["mine.mcap.part", &format!("{name}-cut.mcap")]
+        );
+    }
+
+    #[test]
+    fn the_first_folder_that_can_be_written_is_taken() {
+        let temporary = tempfile::tempdir().unwrap();
+        let here = temporary.path().join("a/b");
+        let candidates = ["/proc/none".into(), here.clone()];
+        let folder = RecordingsFolder::open(&candidates, "rover", 1).unwrap();
+        assert_eq!(folder.path(), here);
+        assert!(RecordingsFolder::open(&candidates[..1], "rover", 1).is_err());
     }
 }

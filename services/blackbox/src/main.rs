@@ -15,12 +15,15 @@ use vigil_setup::RunningArgs;
 
 /// Keeps the last seconds of a running graph, and writes them at an alarm, a crash, or on demand.
 ///
-/// The launcher starts it; it ends with the graph.
+/// The launcher starts it; it ends when it is asked to, or with the last service.
 #[derive(Debug, Parser)]
 #[command(version, about)]
 struct Args {
     #[command(flatten)]
     running: RunningArgs,
+    /// Only write what a black box has kept that was killed.
+    #[arg(long)]
+    rescue: bool,
 }
 
 fn main() -> ExitCode {
@@ -28,14 +31,18 @@ fn main() -> ExitCode {
     let running = match args.running.find() {
         Ok(running) => running,
         Err(error) => {
-            eprintln!("vigil-blackbox: {error}");
+            watch::say(&format!("the black box: {error}"));
             return ExitCode::from(2);
         }
     };
-    match watch::run(running) {
+    let ended = match args.rescue {
+        true => watch::rescue_only(running),
+        false => watch::run(running),
+    };
+    match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("vigil-blackbox: {error}");
+            watch::say(&format!("the black box: {error}"));
             ExitCode::from(1)
         }
     }

@@ -12,7 +12,7 @@ use crate::feeds::{News, is_alarm};
 pub enum Reason {
     /// Somebody asked for it.
     Request,
-    /// A service was replaced by a new process.
+    /// A service has ended, was replaced, or no longer reports.
     Crash,
     /// An alarm rose, or a fault became active.
     Alarm,
@@ -26,7 +26,7 @@ impl Reason {
     /// The reason that news is of, if any.
     pub fn find(news: &News) -> Option<(Self, ServiceName)> {
         match news {
-            News::Replaced(service) => Some((Self::Crash, *service)),
+            News::Replaced(service) | News::Silent(service) => Some((Self::Crash, *service)),
             News::Event(service, event) if is_alarm(event) => Some((Self::Alarm, *service)),
             News::Event(service, event) => {
                 let reason = match EventKind::from_repr(event.kind)? {

@@ -2,20 +2,19 @@
 
 use std::collections::BTreeMap;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use vigil_blocks::Header;
 use vigil_cycle::{Clock, Monotonic};
 use vigil_flight::{FlightError, FlightWriter};
 use vigil_setup::RunningGraph;
 use vigil_timeline::{EventReader, WallClock};
 
 use crate::feeds::TOPICS;
-use crate::folder::RecordingsFolder;
+use crate::folder::{self, RecordingsFolder};
 use crate::reason::Reason;
 use crate::ring::{Record, RingReader};
 
@@ -50,8 +49,10 @@ pub struct Order {
     pub cause: Cause,
     /// From when on, `CLOCK_MONOTONIC` ns.
     pub from_ns: u64,
-    /// Until when, ns; a later order may put it off.
+    /// Until when, ns; further causes may put it off.
     pub until_ns: u64,
+    /// Until when at the latest, ns.
+    pub until_ns_max: u64,
 }
 
 /// Why something is written, in words, and since when.
@@ -68,11 +69,27 @@ pub struct Cause {
 /// What the thread that writes is told while it does.
 #[derive(Debug)]
 struct Orders {
-    until_ns: AtomicU64,
-    /// The first, and those that came since.
-    causes: Mutex<Vec<Cause>>,
+    causes: Mutex<Causes>,
     /// True once the graph ends: nothing follows.
     ends: AtomicBool,
+}
+
+/// Why a recording is written, and until when.
+#[derive(Debug)]
+struct Causes {
+    /// The first, and those that came since.
+    all: Vec<Cause>,
+    until_ns: u64,
+    /// A later cause begins a recording of its own.
+    until_ns_max: u64,
+    /// True once nothing more is written: a cause comes too late.
+    is_closed: bool,
+}
+
+impl Orders {
+    fn causes(&self) -> MutexGuard<'_, Causes> {
+        self.causes.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// A recording that is being written, by a thread of its own.
@@ -90,8 +107,6 @@ pub struct Material {
     pub document: String,
     /// Where recordings lie.
     pub folder: RecordingsFolder,
-    /// Instants by the calendar.
-    pub clock: WallClock,
     /// Blocks that came and were overwritten before they were taken, so far.
     pub lost: AtomicU64,
 }
@@ -100,36 +115,41 @@ impl Recording {
     /// Begins to write.
     pub fn start(material: &Arc<Material>, ring: RingReader, order: Order) -> Self {
         let orders = Arc::new(Orders {
-            until_ns: AtomicU64::new(order.until_ns),
-            causes: Mutex::new(vec![order.cause.clone()]),
+            causes: Mutex::new(Causes {
+                all: vec![order.cause.clone()],
+                until_ns: order.until_ns,
+                until_ns_max: order.until_ns_max,
+                is_closed: false,
+            }),
             ends: AtomicBool::new(false),
         });
         let (material, shared) = (Arc::clone(material), Arc::clone(&orders));
+        let write = move || {
+            // What it will take at least, so that the bound holds while it is written.
+            let memory_bytes = material.running.setup.file.blackbox.memory_bytes();
+            material.folder.prune(memory_bytes);
+            let written = write(&material, ring, &order, &shared);
+            shared.causes().is_closed = true;
+            material.folder.prune(0);
+            written
+        };
         Self {
             orders,
-            thread: thread::spawn(move || {
-                // What it will take at least, so that the bound holds while it is written.
-                material
-                    .folder
-                    .prune(material.running.setup.file.blackbox.memory_bytes());
-                let written = write(&material, ring, &order, &shared);
-                if written.is_err() {
-                    material.folder.adopt_parts();
-                }
-                material.folder.prune(0);
-                written
-            }),
+            thread: thread::spawn(write),
         }
     }
 
-    /// Has a further cause, and goes on until then, at least.
-    pub fn put_off(&self, cause: Cause, until_ns: u64) {
-        self.orders.until_ns.fetch_max(until_ns, Ordering::Relaxed);
-        let causes = self.orders.causes.lock();
-        let mut causes = causes.unwrap_or_else(PoisonError::into_inner);
-        if causes.len() < CAUSES_MAX {
-            causes.push(cause);
+    /// Has a further cause, and goes on until then, at least; false if it is too late for that.
+    pub fn put_off(&self, cause: &Cause, until_ns: u64) -> bool {
+        let mut causes = self.orders.causes();
+        if causes.is_closed || cause.t_ns > causes.until_ns_max {
+            return false;
         }
+        causes.until_ns = until_ns.clamp(causes.until_ns, causes.until_ns_max);
+        if causes.all.len() < CAUSES_MAX {
+            causes.all.push(cause.clone());
+        }
+        true
     }
 
     /// True once it is written, or has failed.
@@ -147,90 +167,145 @@ impl Recording {
     }
 }
 
-/// When a block was published, ns; `None` of what is no block.
-fn published_ns(record: &Record) -> Option<u64> {
-    let header = record.bytes.get(..size_of::<Header>())?;
-    Some(bytemuck::pod_read_unaligned::<Header>(header).t_publish_ns)
-}
-
+/// Writes a recording, and gives it its name.
 fn write(
     material: &Material,
-    mut ring: RingReader,
+    ring: RingReader,
     order: &Order,
     orders: &Orders,
 ) -> Result<PathBuf, RecordingError> {
-    let Material {
-        running,
-        document,
-        folder,
-        clock,
-        lost,
-    } = material;
-    let lost_before = lost.load(Ordering::Relaxed);
-    let graph = running.domain.graph();
-    let name = |cause: &Cause| folder.name(graph, &clock.rfc3339(cause.t_ns), cause.reason.word());
-    let path = name(&order.cause);
-    let mut file = FlightWriter::create(&path, &running.setup, *clock)?;
-    file.attach("document.toml", "application/toml", document.as_bytes())?;
-    loop {
-        let until_ns = orders.until_ns.load(Ordering::Relaxed);
-        let Some(record) = ring.next_record().map_err(RecordingError::Ring)? else {
-            let is_over = Monotonic.now_ns() > until_ns + EVENTS_LATE_NS;
-            if is_over || orders.ends.load(Ordering::Relaxed) {
-                break;
-            }
-            thread::sleep(POLL);
-            continue;
-        };
-        let is_within = |t_ns: u64| (order.from_ns..=until_ns).contains(&t_ns);
-        if let (Some(topic), true) = (
-            TOPICS.get(usize::from(record.code)),
-            published_ns(&record).is_some_and(is_within),
-        ) {
-            file.block(*topic, &record.bytes)?;
+    // The calendar may have been set since the graph began.
+    let clock = WallClock::now();
+    let path = material.name(&order.cause, &clock);
+    let file = FlightWriter::create(&path, &material.running.setup, clock)?;
+    let filling = Filling {
+        file,
+        ring,
+        pending: None,
+        order,
+        orders,
+    };
+    match filling.fill(material, &clock) {
+        Ok(gravest) => {
+            let named = material.name(&gravest, &clock);
+            Ok(match std::fs::rename(&path, &named) {
+                Ok(()) => named,
+                Err(_) => path,
+            })
+        }
+        Err(error) => {
+            folder::adopt(&folder::part_of(&path));
+            Err(error)
         }
     }
-    let until_ns = orders.until_ns.load(Ordering::Relaxed);
-    let mut events = EventReader::open(&running.domain.events_file());
-    while let Some(entry) = events.next_entry().map_err(RecordingError::Events)? {
-        if (order.from_ns..=until_ns).contains(&entry.t_ns) {
-            file.event(&entry)?;
-        }
-    }
-    let mut causes = orders
-        .causes
-        .lock()
-        .map_or_else(|_| Vec::new(), |causes| causes.clone());
-    causes.sort();
-    let gravest = causes.first().unwrap_or(&order.cause);
-    let mut about = about(material, gravest, &causes);
-    about.insert("gaps".into(), ring.overtaken().to_string());
-    let lost = lost.load(Ordering::Relaxed) - lost_before;
-    about.insert("lost".into(), lost.to_string());
-    file.metadata("vigil", &about)?;
-    file.finish()?;
-    // The gravest cause names it.
-    let named = name(gravest);
-    Ok(match std::fs::rename(&path, &named) {
-        Ok(()) => named,
-        Err(_) => path,
-    })
 }
 
-/// What is said of a recording beside its messages.
-fn about(material: &Material, gravest: &Cause, causes: &[Cause]) -> BTreeMap<String, String> {
-    let Material { running, clock, .. } = material;
-    let told = causes.iter();
-    let told = told.map(|cause| format!("{} {}", clock.rfc3339(cause.t_ns), cause.text));
-    let told: Vec<String> = told.collect();
-    let about = [
-        ("graph", running.domain.graph().to_owned()),
-        ("reason", gravest.reason.to_string()),
-        ("what", gravest.text.clone()),
-        ("when", clock.rfc3339(gravest.t_ns)),
-        ("causes", told.join("\n")),
-        ("config_hash", format!("{:016x}", running.setup.hash)),
-    ];
-    let about = about.map(|(key, value)| (key.to_owned(), value));
-    BTreeMap::from(about)
+impl Material {
+    fn name(&self, cause: &Cause, clock: &WallClock) -> PathBuf {
+        let time = clock.rfc3339(cause.t_ns);
+        self.folder.name(&time, cause.reason.word())
+    }
+
+    /// What is said of a recording beside its messages.
+    fn about(
+        &self,
+        gravest: &Cause,
+        causes: &[Cause],
+        clock: &WallClock,
+    ) -> BTreeMap<String, String> {
+        let time = |cause: &Cause| clock.rfc3339(cause.t_ns);
+        let told = causes
+            .iter()
+            .map(|cause| format!("{} {}", time(cause), cause.text));
+        let told: Vec<String> = told.collect();
+        let about = [
+            ("graph", self.running.domain.graph().to_owned()),
+            ("reason", gravest.reason.to_string()),
+            ("what", gravest.text.clone()),
+            ("when", time(gravest)),
+            ("causes", told.join("\n")),
+            ("config_hash", format!("{:016x}", self.running.setup.hash)),
+        ];
+        let about = about.map(|(key, value)| (key.to_owned(), value));
+        BTreeMap::from(about)
+    }
+}
+
+/// A recording that is being filled.
+struct Filling<'a> {
+    file: FlightWriter,
+    ring: RingReader,
+    /// What lies beyond the present end: it belongs to the recording if that is put off.
+    pending: Option<Record>,
+    order: &'a Order,
+    orders: &'a Orders,
+}
+
+impl Filling<'_> {
+    /// Writes all of it; the gravest of its causes.
+    fn fill(mut self, material: &Material, clock: &WallClock) -> Result<Cause, RecordingError> {
+        let document = material.document.as_bytes();
+        self.file
+            .attach("document.toml", "application/toml", document)?;
+        let lost_before = material.lost.load(Ordering::Relaxed);
+        self.blocks()?;
+        self.events(&material.running.domain.events_file())?;
+        let mut causes = self.orders.causes().all.clone();
+        causes.sort();
+        let gravest = causes.first().unwrap_or(&self.order.cause).clone();
+        let mut about = material.about(&gravest, &causes, clock);
+        let lost = material.lost.load(Ordering::Relaxed);
+        let lost = lost.saturating_sub(lost_before);
+        about.insert("lost".to_owned(), lost.to_string());
+        about.insert("gaps".to_owned(), self.ring.overtaken().to_string());
+        self.file.metadata("vigil", &about)?;
+        self.file.finish()?;
+        Ok(gravest)
+    }
+
+    /// Writes every block until the end, which may be put off meanwhile.
+    fn blocks(&mut self) -> Result<(), RecordingError> {
+        loop {
+            let next = match self.pending.take() {
+                Some(record) => Some(record),
+                None => self.ring.next_record().map_err(RecordingError::Ring)?,
+            };
+            let until_ns = self.orders.causes().until_ns;
+            match next {
+                Some(record) if record.t_ns <= until_ns => {
+                    let topic = TOPICS.get(usize::from(record.code));
+                    if let (Some(topic), true) = (topic, record.t_ns >= self.order.from_ns) {
+                        self.file.block(*topic, &record.bytes)?;
+                    }
+                }
+                next => {
+                    self.pending = next;
+                    if self.is_over() {
+                        return Ok(());
+                    }
+                    thread::sleep(POLL);
+                }
+            }
+        }
+    }
+
+    /// True, and then no cause is taken any more, if all of the recording's time has passed.
+    fn is_over(&self) -> bool {
+        let mut causes = self.orders.causes();
+        let is_past = Monotonic.now_ns() > causes.until_ns + EVENTS_LATE_NS;
+        causes.is_closed = is_past || self.orders.ends.load(Ordering::Relaxed);
+        causes.is_closed
+    }
+
+    /// Writes the events of the same time.
+    fn events(&mut self, path: &Path) -> Result<(), RecordingError> {
+        let until_ns = self.orders.causes().until_ns;
+        let mut events = EventReader::open(path);
+        while let Some(entry) = events.next_entry().map_err(RecordingError::Events)? {
+            if (self.order.from_ns..=until_ns).contains(&entry.t_ns) {
+                self.file.event(&entry)?;
+            }
+        }
+        Ok(())
+    }
 }

@@ -1,7 +1,7 @@
 //! The last seconds as a file of fixed size: written by one thread, read by another meanwhile, and
 //! by whoever comes after the process was killed.
 //!
-//! A record is a head of eight bytes and its content, filled up to eight. Records lie one behind
+//! A record is a head of 16 bytes and its content, filled up to eight. Records lie one behind
 //! the other; none goes over the end of the file, where a filler stands instead. The file begins
 //! with a page that holds two offsets, counted without end: of the oldest record, and behind the
 //! newest. The first moves before what it passes is overwritten, the second after what it passes is
@@ -17,9 +17,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Bytes before the records.
 const PAGE: u64 = 4096;
 /// Says what the file is, and which form it has.
-const MAGIC: u64 = u64::from_le_bytes(*b"vigilbb1");
-/// Bytes of a record's head: its length, its code, and nothing.
-const HEAD: usize = 8;
+const MAGIC: u64 = u64::from_le_bytes(*b"vigilbb2");
+/// Bytes of a record's head: its length, its code, nothing, and when it came.
+const HEAD: usize = 16;
 /// Code of a filler.
 const FILLER: u16 = u16::MAX;
 /// Room that is made at once, so that the first offset need not be written for each record.
@@ -63,6 +63,8 @@ pub struct RingReader {
 pub struct Record {
     /// What its content is.
     pub code: u16,
+    /// When it came, `CLOCK_MONOTONIC` ns.
+    pub t_ns: u64,
     /// The content.
     pub bytes: Vec<u8>,
 }
@@ -106,7 +108,7 @@ impl RingWriter {
     ///
     /// # Errors
     /// The system's. A record that does not fit is refused.
-    pub fn push(&mut self, code: u16, content: &[u8]) -> io::Result<()> {
+    pub fn push(&mut self, code: u16, t_ns: u64, content: &[u8]) -> io::Result<()> {
         let length = u32::try_from(content.len()).unwrap_or(u32::MAX);
         let size = padded(content.len());
         if length > CONTENT_MAX || 4 * size > self.capacity || code == FILLER {
@@ -115,12 +117,15 @@ impl RingWriter {
         let rest = self.capacity - self.end % self.capacity;
         if rest < size {
             self.room(rest)?;
-            let content = u32::try_from(rest as usize - HEAD).unwrap_or(0);
-            self.head(content, FILLER);
+            // What is too short for a head is passed over without one.
+            if rest >= HEAD as u64 {
+                let content = u32::try_from(rest as usize - HEAD).unwrap_or(0);
+                self.head(content, FILLER, 0);
+            }
             self.flush(rest)?;
         }
         self.room(size)?;
-        self.head(length, code);
+        self.head(length, code, t_ns);
         self.buffer.extend_from_slice(content);
         self.buffer.resize(self.buffer.len().next_multiple_of(8), 0);
         self.end += size;
@@ -131,10 +136,11 @@ impl RingWriter {
         Ok(())
     }
 
-    fn head(&mut self, length: u32, code: u16) {
+    fn head(&mut self, length: u32, code: u16, t_ns: u64) {
         self.buffer.extend_from_slice(&length.to_le_bytes());
         self.buffer.extend_from_slice(&code.to_le_bytes());
         self.buffer.extend_from_slice(&[0; 2]);
+        self.buffer.extend_from_slice(&t_ns.to_le_bytes());
     }
 
     /// Writes what is buffered, and passes over `rest` bytes behind it up to the file's end.
@@ -159,6 +165,11 @@ impl RingWriter {
             self.commit()?;
         }
         while oldest < wanted {
+            let rest = self.capacity - oldest % self.capacity;
+            if rest < HEAD as u64 {
+                oldest += rest;
+                continue;
+            }
             let mut length = [0; 4];
             let at = PAGE + oldest % self.capacity;
             self.file.read_exact_at(&mut length, at)?;
@@ -238,13 +249,21 @@ impl RingReader {
             if self.next >= self.offsets.newest.load(Ordering::Acquire) {
                 return Ok(None);
             }
-            let at = PAGE + self.next % self.capacity;
+            let place = self.next % self.capacity;
+            let rest = self.capacity - place;
+            if rest < HEAD as u64 {
+                self.next += rest;
+                continue;
+            }
+            let at = PAGE + place;
             let mut head = [0; HEAD];
             self.file.read_exact_at(&mut head, at)?;
-            let [a, b, c, d, e, f, ..] = head;
+            let [a, b, c, d, e, f, _, _, t @ ..] = head;
             let (length, code) = (u32::from_le_bytes([a, b, c, d]), u16::from_le_bytes([e, f]));
+            let size = padded(length as usize);
+            let is_sound = size <= rest && (code == FILLER || length <= CONTENT_MAX);
             let mut bytes = Vec::new();
-            if code != FILLER && length <= CONTENT_MAX {
+            if is_sound && code != FILLER {
                 bytes.resize(length as usize, 0);
                 self.file.read_exact_at(&mut bytes, at + HEAD as u64)?;
             }
@@ -252,12 +271,13 @@ impl RingReader {
                 // It was overwritten while it was read.
                 continue;
             }
-            if code != FILLER && length > CONTENT_MAX {
+            if !is_sound {
                 return Err(io::Error::other("a broken record"));
             }
-            self.next += padded(length as usize);
+            self.next += size;
             if code != FILLER {
-                return Ok(Some(Record { code, bytes }));
+                let t_ns = u64::from_le_bytes(t);
+                return Ok(Some(Record { code, t_ns, bytes }));
             }
         }
     }
@@ -283,6 +303,7 @@ mod tests {
         bytes.resize(8 + length, number as u8);
         Record {
             code: number as u16 % 7,
+            t_ns: 1000 + number,
             bytes,
         }
     }
@@ -301,7 +322,7 @@ mod tests {
             let number_in = |r: &Record| u64::from_le_bytes(r.bytes[..8].try_into().unwrap());
             for (number, length) in lengths.iter().enumerate() {
                 let added = record(number as u64, *length);
-                ring.push(added.code, &added.bytes).unwrap();
+                ring.push(added.code, added.t_ns, &added.bytes).unwrap();
                 if commits[number] {
                     ring.commit().unwrap();
                     committed = number + 1;
@@ -317,7 +338,7 @@ mod tests {
             }
             prop_assert!(from + left.len() as u64 >= committed as u64);
             // All of it, unless the ring was too small.
-            let bytes: usize = lengths.iter().map(|length| length + 24).sum();
+            let bytes: usize = lengths.iter().map(|length| length + 32).sum();
             prop_assert!(from == 0 || bytes > 8 << 10);
             // Who follows misses nothing but what was overwritten.
             let numbers: Vec<u64> = followed.iter().map(number_in).collect();
@@ -332,9 +353,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("ring");
         let mut ring = RingWriter::create(&path, 8 << 10).unwrap();
-        assert!(ring.push(1, &[0; 2048]).is_err());
-        assert!(ring.push(FILLER, &[]).is_err());
-        ring.push(1, &[5; 100]).unwrap();
+        assert!(ring.push(1, 0, &[0; 2048]).is_err());
+        assert!(ring.push(FILLER, 0, &[]).is_err());
+        ring.push(1, 0, &[5; 100]).unwrap();
         ring.commit().unwrap();
         assert_eq!(read(&mut ring.reader()).len(), 1);
         for text in [&b""[..], b"vigil", &[7; 9000]] {

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
@@ -12,7 +12,6 @@ use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Graph, Monotonic, placement, signal};
 use vigil_setup::{RunningGraph, Setup};
-use vigil_timeline::WallClock;
 
 use crate::feeds::{Feeds, News};
 use crate::folder::RecordingsFolder;
@@ -24,28 +23,87 @@ use crate::ring::{RingReader, RingWriter};
 const POLL_MAX: Duration = Duration::from_millis(50);
 /// Nanoseconds of a second.
 const NS: f64 = 1e9;
+/// A recording is at most so many times as long after its first cause as after its last.
+const AFTER_MAX: u64 = 6;
+/// Of a request that the launcher makes when a service is given up.
+const CRASH: &str = "crash: ";
 
-/// Keeps and writes until it is asked to stop.
+/// Keeps and writes until it is asked to stop, or no service is left.
 pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     signal::install();
+    let material = Arc::new(material(running)?);
+    let domain = &material.running.domain;
+    fs::write(
+        domain.recordings_file(),
+        material.folder.path().as_os_str().as_encoded_bytes(),
+    )?;
+    let left = set_aside(&domain.ring_file());
+    let rescue = left.as_deref().and_then(|left| rescue(&material, left));
+    let kept = keep(&material);
+    // Whatever happened: what was left is written before this process ends.
+    rescue.map(tell);
+    if let Some(left) = left {
+        let _ = fs::remove_file(left);
+    }
+    kept?;
+    // An orderly end: nothing is left to be rescued.
+    let _ = fs::remove_file(domain.ring_file());
+    Ok(())
+}
+
+/// Writes what a black box has kept that was killed with its graph, and nothing else.
+pub fn rescue_only(running: RunningGraph) -> Result<(), Box<dyn Error>> {
+    let material = Arc::new(material(running)?);
+    let ring = material.running.domain.ring_file();
+    rescue(&material, &ring).map(tell);
+    let _ = fs::remove_file(ring);
+    Ok(())
+}
+
+fn material(running: RunningGraph) -> Result<Material, Box<dyn Error>> {
     let setup = &running.setup;
     placement::keep_off(&ServiceName::ALL.map(|name| setup.service(name).core));
-    let settings = setup.file.blackbox.clone();
-    let graph = running.domain.graph().to_owned();
-    let path = settings.folder(&setup.path, &graph);
-    let folder = RecordingsFolder::open(path, settings.folder_bytes())?;
+    let (settings, graph) = (&setup.file.blackbox, running.domain.graph());
+    let candidates = settings.folders(&setup.path, graph);
+    let folder = RecordingsFolder::open(&candidates, graph, settings.folder_bytes())?;
     for cut in folder.adopt_parts() {
-        eprintln!("vigil-blackbox: {} was not finished", cut.display());
+        say(&format!("{} was cut short", cut.display()));
     }
-    let material = Arc::new(Material {
+    Ok(Material {
         document: running.document.to_text()?,
-        clock: WallClock::now(),
-        lost: AtomicU64::new(0),
         folder,
+        lost: AtomicU64::new(0),
         running,
-    });
-    let domain = &material.running.domain;
-    let mut rescue = rescue(&material, &domain.ring_file());
+    })
+}
+
+/// Puts the ring of an earlier process aside; `None` if there is none.
+fn set_aside(ring: &Path) -> Option<PathBuf> {
+    let left = ring.with_extension("left");
+    fs::rename(ring, &left).ok().map(|()| left)
+}
+
+/// Writes what an earlier process has kept.
+fn rescue(material: &Arc<Material>, path: &Path) -> Option<Recording> {
+    let ring = RingReader::open(path).ok()?;
+    let now_ns = Monotonic.now_ns();
+    let order = Order {
+        cause: Cause {
+            reason: Reason::Crash,
+            t_ns: now_ns,
+            text: "the black box before this one was killed".to_owned(),
+        },
+        from_ns: 0,
+        until_ns: now_ns,
+        until_ns_max: now_ns,
+    };
+    Some(Recording::start(material, ring, order))
+}
+
+/// Keeps the last seconds, and writes them when there is a reason.
+fn keep(material: &Arc<Material>) -> Result<(), Box<dyn Error>> {
+    let (domain, setup) = (&material.running.domain, &material.running.setup);
+    let settings = &setup.file.blackbox;
     let ring = RingWriter::create(&domain.ring_file(), settings.memory_bytes())?;
     let mut feeds = Feeds::open(&Graph::SharedMemory(Link::join(domain, "blackbox")?))?;
     let mut blackbox = Blackbox {
@@ -53,47 +111,22 @@ pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
         after_ns: (settings.after_s * NS) as u64,
         miss_pause_ns: (settings.miss_pause_s * NS) as u64,
         miss_ns: None,
-        material: Arc::clone(&material),
+        material: Arc::clone(material),
         ring,
-        recording: None,
+        recordings: Vec::new(),
     };
-    let pause = pause(&material.running.setup);
-    let mut news = Vec::new();
-    while !signal::stop_requested() {
-        thread::sleep(pause);
-        news.clear();
-        feeds.drain(&mut blackbox.ring, &mut news)?;
-        material.lost.store(feeds.lost(), Ordering::Relaxed);
-        blackbox.look(&news);
-        if let Some(recording) = rescue.take_if(|recording| recording.is_over()) {
-            tell(recording);
+    let pause = pause(setup);
+    let mut ends = false;
+    while !ends {
+        // The last look comes after the order to stop.
+        ends = signal::stop_requested() || feeds.is_deserted();
+        if !ends {
+            thread::sleep(pause);
         }
+        blackbox.look(&mut feeds)?;
     }
-    feeds.drain(&mut blackbox.ring, &mut news)?;
-    [rescue, blackbox.recording]
-        .into_iter()
-        .flatten()
-        .for_each(tell);
-    // An orderly end: nothing is left to be rescued.
-    let _ = fs::remove_file(domain.ring_file());
+    blackbox.recordings.into_iter().for_each(tell);
     Ok(())
-}
-
-/// Writes what a process before this one has kept, if it was killed.
-fn rescue(material: &Arc<Material>, path: &Path) -> Option<Recording> {
-    let ring = RingReader::open(path).ok()?;
-    let now_ns = Monotonic.now_ns();
-    let cause = Cause {
-        reason: Reason::Crash,
-        t_ns: now_ns,
-        text: "the black box was replaced by a new process".to_owned(),
-    };
-    let order = Order {
-        cause,
-        from_ns: 0,
-        until_ns: now_ns,
-    };
-    Some(Recording::start(material, ring, order))
 }
 
 /// Between two looks: half the time in which the shortest queue fills.
@@ -112,26 +145,39 @@ struct Blackbox {
     miss_ns: Option<u64>,
     material: Arc<Material>,
     ring: RingWriter,
-    recording: Option<Recording>,
+    /// Those that are being written; the last may still be put off.
+    recordings: Vec<Recording>,
 }
 
 impl Blackbox {
-    /// Begins a recording, or puts off the end of the present one, if there is a reason.
-    fn look(&mut self, news: &[News]) {
-        if let Some(recording) = self.recording.take_if(|recording| recording.is_over()) {
-            tell(recording);
-        }
-        for item in news {
-            if let Some((reason, service)) = Reason::find(item) {
-                let text = format!("{reason}, says {}", service.as_str());
+    /// Takes what has come. Begins a recording, or puts off the end of the present one, if there is
+    /// a reason.
+    fn look(&mut self, feeds: &mut Feeds) -> Result<(), Box<dyn Error>> {
+        let mut news = Vec::new();
+        feeds.drain(&mut self.ring, &mut news)?;
+        self.material.lost.store(feeds.lost(), Ordering::Relaxed);
+        let (over, going) = std::mem::take(&mut self.recordings)
+            .into_iter()
+            .partition(Recording::is_over);
+        self.recordings = going;
+        let over: Vec<Recording> = over;
+        over.into_iter().for_each(tell);
+        for (reason, text) in news.iter().filter_map(reason) {
+            if reason != Reason::Miss || feeds.has_frames() {
                 self.note(reason, text);
             }
         }
         let request = self.material.running.domain.request_file();
-        if let Ok(text) = fs::read_to_string(&request) {
-            let _ = fs::remove_file(&request);
-            self.note(Reason::Request, text);
+        let taken = request.with_extension("taken");
+        if fs::rename(&request, &taken).is_ok() {
+            let text = fs::read_to_string(&taken).unwrap_or_default();
+            let _ = fs::remove_file(&taken);
+            match text.strip_prefix(CRASH) {
+                Some(crash) => self.note(Reason::Crash, crash.to_owned()),
+                None => self.note(Reason::Request, text),
+            }
         }
+        Ok(())
     }
 
     fn note(&mut self, reason: Reason, text: String) {
@@ -141,12 +187,12 @@ impl Blackbox {
             t_ns: now_ns,
             text,
         };
-        if let Some(recording) = &self.recording {
+        let until_ns = now_ns + self.after_ns;
+        if let Some(recording) = self.recordings.last() {
             // Misses alone do not make a recording longer.
-            if reason != Reason::Miss {
-                recording.put_off(cause, now_ns + self.after_ns);
+            if reason == Reason::Miss || recording.put_off(&cause, until_ns) {
+                return;
             }
-            return;
         }
         if reason == Reason::Miss {
             let is_early = |last_ns: u64| now_ns < last_ns + self.miss_pause_ns;
@@ -158,17 +204,37 @@ impl Blackbox {
         let order = Order {
             cause,
             from_ns: now_ns.saturating_sub(self.before_ns),
-            until_ns: now_ns + self.after_ns,
+            until_ns,
+            until_ns_max: now_ns + AFTER_MAX * self.after_ns,
         };
         let ring = self.ring.reader();
-        self.recording = Some(Recording::start(&self.material, ring, order));
+        self.recordings
+            .push(Recording::start(&self.material, ring, order));
     }
+}
+
+/// The reason that news is of, in words.
+fn reason(news: &News) -> Option<(Reason, String)> {
+    let (reason, service) = Reason::find(news)?;
+    let name = service.as_str();
+    let text = match news {
+        News::Replaced(_) => format!("{name} was replaced by a new process"),
+        News::Silent(_) => format!("{name} no longer reports"),
+        News::Event(..) => format!("{reason}, says {name}"),
+    };
+    Some((reason, text))
 }
 
 /// Waits until a recording is finished, and says where it lies.
 fn tell(recording: Recording) {
     match recording.finish() {
-        Ok(path) => eprintln!("vigil: recorded {}", path.display()),
-        Err(error) => eprintln!("vigil: no recording: {error}"),
+        Ok(path) => say(&format!("recorded {}", path.display())),
+        Err(error) => say(&format!("no recording: {error}")),
     }
+}
+
+/// Says it; that nobody reads it is no reason to end.
+pub fn say(text: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "vigil: {text}");
 }

@@ -67,14 +67,24 @@ impl Children {
     }
 
     /// Takes over the services of a launcher that is gone; those that are gone, too, are restarted.
-    pub fn adopt(plan: &Plan, domain: &Domain, locks: Locks) -> Result<Self, LauncherError> {
+    pub fn adopt(
+        plan: &Plan,
+        domain: &Domain,
+        observer: &mut HealthObserver,
+        locks: Locks,
+    ) -> Result<Self, LauncherError> {
         let (mut children, listed) = (Self::none(domain, locks), domain.processes());
         for name in plan.services() {
             let found = listed.services.iter().find(|(of, _)| *of == name);
             let found = found.and_then(|(_, pid)| domain.find_process(*pid));
             let process = match found {
                 Some(process) => Process::found(process),
-                None => Process::start(plan.command(name, &report_file(domain, name)))?,
+                None => {
+                    let (began_ns, drive) = (Monotonic.now_ns(), observer.drive());
+                    let report = report_file(domain, name);
+                    observer.timeline.add_restart(name, began_ns);
+                    Process::start(plan.command_again(name, &report, drive.as_ref()))?
+                }
             };
             children.add(plan, domain, (name, process));
         }
@@ -130,6 +140,8 @@ impl Children {
     /// Restarts what has died; true if a service had to be given up.
     pub fn look_after(&mut self, plan: &Plan, observer: &mut HealthObserver) -> bool {
         let mut is_listed = true;
+        // The last process that held it for another launcher may have ended.
+        self.locks.graph.take_over();
         for service in &mut self.services {
             let now = Instant::now();
             let name = service.name.as_str();
@@ -157,8 +169,6 @@ impl Children {
             if service.restart_at.is_some_and(|at| now >= at) && !signal::stop_requested() {
                 service.restart_at = None;
                 service.history.restarted(now);
-                // The one that has ended may have been the last of another launcher's.
-                self.locks.graph.take_over();
                 let (began_ns, drive) = (Monotonic.now_ns(), observer.drive());
                 let command = plan.command_again(service.name, &service.report, drive.as_ref());
                 match Process::start(command) {
@@ -220,8 +230,12 @@ impl Children {
                 service.process.wait(KILL_LIMIT);
             }
         }
-        // Last: it records how they ended.
-        if let Some(blackbox) = &mut self.blackbox {
+    }
+
+    /// Lets the black box finish what it writes, and ends it: after the services, whose end it
+    /// records.
+    pub fn stop_blackbox(&mut self) {
+        if let Some(mut blackbox) = self.blackbox.take() {
             blackbox.stop();
         }
     }

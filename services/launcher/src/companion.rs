@@ -87,13 +87,44 @@ impl Companion {
         let Some(process) = &mut self.process else {
             return;
         };
-        process.terminate();
+        if process.ended().is_none() {
+            process.terminate();
+        }
         if !process.wait(STOP_LIMIT) {
             tell!("vigil: the black box did not stop: killed");
             process.kill();
             process.wait(KILL_LIMIT);
         }
     }
+}
+
+/// Has a black box that was killed with its whole graph leave a recording, before its memory and
+/// the graph's files are gone.
+pub fn rescue(plan: &Plan, domain: &Domain) {
+    if !domain.ring_file().exists() {
+        return;
+    }
+    let command = CommandLine {
+        options: vec![
+            "--rescue".to_owned(),
+            "--graph".to_owned(),
+            domain.graph().to_owned(),
+        ],
+        program: plan.programs.join("vigil-blackbox"),
+    };
+    // Without one, or if it fails, the graph starts all the same.
+    if let Ok(mut process) = Process::start(command)
+        && !process.wait(STOP_LIMIT)
+    {
+        process.kill();
+        process.wait(KILL_LIMIT);
+    }
+}
+
+/// Asks the black box to record that a service was given up.
+pub fn record_crash(domain: &Domain, gave_up: &str) {
+    // What cannot be asked for is not recorded; the summary says what happened.
+    let _ = std::fs::write(domain.request_file(), format!("crash: {gave_up}"));
 }
 
 impl Drop for Companion {

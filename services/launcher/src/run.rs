@@ -12,6 +12,7 @@ use vigil_timeline::EventWriter;
 
 use crate::args::LauncherArgs;
 use crate::children::Children;
+use crate::companion;
 use crate::error::LauncherError;
 use crate::locks::{Claim, Locks};
 use crate::observer::{HealthObserver, ServiceView};
@@ -73,6 +74,12 @@ impl OwnGraph {
         let name = domain.graph();
         let locks = match claim(&domain)? {
             Claim::Free(locks) => locks,
+            Claim::Orphaned(_) if domain.members().is_empty() => {
+                return Err(Refusal(format!(
+                    "vigil: `vigil check-publisher` or `vigil record` listens in the place of \
+                     graph '{name}': end it first, or give this graph another name with --graph"
+                )));
+            }
             Claim::Orphaned(_) => {
                 return Err(Refusal(format!(
                     "vigil: the services of a graph named '{name}' are running ({}), and their \
@@ -130,6 +137,7 @@ impl OwnGraph {
             locks,
         } = self;
         if !args.adopt {
+            companion::rescue(&plan, &domain);
             domain.remove_residue();
             EventWriter::remove(&domain.events_file());
             domain
@@ -143,7 +151,9 @@ impl OwnGraph {
         let mut children = match args.adopt {
             true => {
                 observer.skip_told(&domain.events_file());
-                Children::adopt(&plan, &domain, locks)?
+                // What a simulator that is started anew has to know.
+                observer.poll();
+                Children::adopt(&plan, &domain, &mut observer, locks)?
             }
             false => Children::start(&plan, &domain, locks)?,
         };
@@ -161,12 +171,16 @@ impl OwnGraph {
         };
         let ended = watch.until_end(&mut observer, &mut children);
         observer.close(DRAIN);
+        if let Some(gave_up) = children.gave_up() {
+            companion::record_crash(&domain, gave_up);
+        }
         children.stop();
         observer.poll();
         children.take_failures(&mut observer);
         let last = observer.timeline.take_new(true);
         last.iter().for_each(|entry| teller.tell(entry));
         teller.tell_misses(u64::MAX);
+        children.stop_blackbox();
         let summary = summary(&plan, &observer, &children, ended);
         drop(observer);
         domain.remove_residue();

@@ -18,6 +18,7 @@ pub struct Waiting {
     began: Instant,
     next: Duration,
     graph: String,
+    config: String,
     /// The source, if frames come from outside.
     outside: Option<String>,
 }
@@ -30,6 +31,7 @@ impl Waiting {
             began: Instant::now(),
             next: FIRST,
             graph: graph.name.clone(),
+            config: setup.path.display().to_string(),
             outside: source.is_outside().then(|| source.to_string()),
         }
     }
@@ -51,10 +53,11 @@ impl Waiting {
             return None;
         }
         self.next += AGAIN;
-        let (graph, frames) = (&self.graph, frames(observer));
+        let (graph, config, frames) = (&self.graph, &self.config, frames(observer));
         Some(format!(
             "graph '{graph}' waits for a publisher ({source}): {frames}; \
-             `vigil check-publisher --graph {graph} --source {source}` says what does not fit"
+             `vigil check-publisher --config {config} --graph {graph} --source {source}` says \
+             what does not fit"
         ))
     }
 }

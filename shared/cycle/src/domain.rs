@@ -154,6 +154,12 @@ impl Domain {
         self.folder.join("request")
     }
 
+    /// File in which the black box says where its recordings lie.
+    #[must_use]
+    pub fn recordings_file(&self) -> PathBuf {
+        self.folder.join("recordings")
+    }
+
     /// File in which the supervisor keeps the faults, for one that replaces it.
     #[must_use]
     pub fn faults_file(&self) -> PathBuf {
@@ -294,6 +300,8 @@ impl Domain {
             self.faults_file(),
             self.document_file(),
             self.request_file(),
+            self.recordings_file(),
+            self.ring_file(),
         ] {
             let _ = fs::remove_file(file);
         }

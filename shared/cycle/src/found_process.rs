@@ -28,6 +28,18 @@ impl Domain {
     }
 }
 
+impl Domain {
+    /// Every process of this graph but this one: its launcher, services and black box, listed or
+    /// not.
+    #[must_use]
+    pub fn members(&self) -> Vec<FoundProcess> {
+        let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
+        let pids = processes.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+        let others = pids.filter(|pid| *pid != std::process::id());
+        others.filter_map(|pid| self.find_process(pid)).collect()
+    }
+}
+
 impl FoundProcess {
     /// Its number.
     #[must_use]
@@ -86,6 +98,7 @@ mod tests {
         let mut service = sleeper();
         assert_eq!(domain.find_process(stranger.id()), None);
         let found = domain.find_process(service.id()).unwrap();
+        assert!(domain.members().contains(&found));
         assert_eq!((found.id(), found.lives()), (service.id(), true));
         found.terminate();
         // Not reaped yet, it is there and lives no more.

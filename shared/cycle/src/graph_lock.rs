@@ -19,6 +19,7 @@ const LOCK_PAUSE: Duration = Duration::from_millis(5);
 #[derive(Debug)]
 pub struct GraphLock {
     file: File,
+    is_held: bool,
 }
 
 impl GraphLock {
@@ -35,8 +36,8 @@ impl GraphLock {
 
     /// Holds the lock from now on, if no process holds it that was started by another launcher.
     /// Children that share this lock then hold it as well.
-    pub fn take_over(&self) {
-        let _ = self.file.try_lock();
+    pub fn take_over(&mut self) {
+        self.is_held = self.is_held || self.file.try_lock().is_ok();
     }
 }
 
@@ -47,7 +48,8 @@ impl Domain {
     /// The file system's.
     pub fn lock(&self) -> io::Result<Option<GraphLock>> {
         let file = open_to_lock(&self.lock_file())?;
-        Ok(lock_soon(&file)?.then_some(GraphLock { file }))
+        let is_held = lock_soon(&file)?;
+        Ok(is_held.then_some(GraphLock { file, is_held }))
     }
 
     /// The lock of a graph whose services hold it, for a launcher that adopts them: see
@@ -57,7 +59,8 @@ impl Domain {
     /// The file system's.
     pub fn adopt_lock(&self) -> io::Result<GraphLock> {
         let file = open_to_lock(&self.lock_file())?;
-        Ok(GraphLock { file })
+        let is_held = false;
+        Ok(GraphLock { file, is_held })
     }
 }
 

@@ -41,11 +41,11 @@ impl LauncherLock {
         if let Some(pid) = blackbox {
             lines.push_str(&format!("blackbox {pid}\n"));
         }
-        self.file.rewind()?;
-        self.file.set_len(0)?;
-        // One write: a reader meets all of it, or nothing.
+        // A reader in between meets the new lines, and perhaps old ones behind them.
         let text = format!("launcher {}\n{lines}", std::process::id());
-        self.file.write_all(text.as_bytes())
+        self.file.rewind()?;
+        self.file.write_all(text.as_bytes())?;
+        self.file.set_len(text.len() as u64)
     }
 }
 
@@ -72,8 +72,10 @@ impl Domain {
             lines.find(|(of, _)| *of == name)?.1.parse::<u32>().ok()
         };
         let services = ServiceName::ALL.iter();
+        // Another may hold the lock, and not be listed yet.
+        let lives = |pid: &u32| is_held && self.find_process(*pid).is_some();
         Processes {
-            launcher: pid("launcher").filter(|_| is_held),
+            launcher: pid("launcher").filter(lives),
             services: services
                 .filter_map(|&name| Some((name, pid(name.as_str())?)))
                 .collect(),
@@ -99,6 +101,7 @@ mod tests {
         let domain = Domain::new(&graph, Queues::default()).unwrap();
         assert_eq!(domain.processes(), Processes::default());
         let mut lock = domain.lock_launcher().unwrap().unwrap();
+        let _graph = domain.lock().unwrap().unwrap();
         assert!(domain.lock_launcher().unwrap().is_none());
         let many = ServiceName::ALL.map(|name| (name, 4_000_000));
         lock.list(&many, Some(9)).unwrap();

@@ -41,6 +41,12 @@ pub(crate) fn graph(
     drive(file, robot, &mut report);
     navigation::check(file, robot, &mut report);
     supervisor::check(file, &mut report);
+    let blackbox = &file.blackbox;
+    if blackbox.folder_mib < 2 * blackbox.memory_mib {
+        let least = 2 * blackbox.memory_mib;
+        let message = format!("allowed is {least} or more, twice blackbox.memory_mib");
+        report("blackbox.folder_mib", message);
+    }
 }
 
 /// What a planner spends on a decision model; `report` gets the key and a message if that is more

@@ -74,6 +74,8 @@ pub struct EventReader {
     part: Option<BufReader<File>>,
     /// A line of which the end is not written yet.
     begun: String,
+    /// True if this part is finished, and the end is met again.
+    turns_over: bool,
 }
 
 impl EventReader {
@@ -85,6 +87,7 @@ impl EventReader {
             part: open(&before(path)).or_else(|| open(path)),
             path: path.to_owned(),
             begun: String::new(),
+            turns_over: false,
         }
     }
 
@@ -94,6 +97,10 @@ impl EventReader {
     /// The system's.
     pub fn next_entry(&mut self) -> io::Result<Option<TimelineEntry>> {
         loop {
+            if self.part.is_none() {
+                // The launcher begins it with the graph.
+                self.part = File::open(&self.path).ok().map(BufReader::new);
+            }
             let Some(part) = &mut self.part else {
                 return Ok(None);
             };
@@ -120,8 +127,12 @@ impl EventReader {
         if part.get_ref().metadata()?.ino() == newest.metadata()?.ino() {
             return Ok(false);
         }
-        self.begun.clear();
-        self.part = Some(BufReader::new(newest));
+        if self.turns_over {
+            self.begun.clear();
+            self.part = Some(BufReader::new(newest));
+        }
+        // Once more before that: the last line may have come since the end was met.
+        self.turns_over = !self.turns_over;
         Ok(true)
     }
 }
@@ -163,7 +174,11 @@ mod tests {
         assert_eq!(read(&mut reader), [8]);
         EventWriter::remove(&path);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-        assert_eq!(read(&mut EventReader::open(&path)), [0; 0]);
+        let mut early = EventReader::open(&path);
+        assert_eq!(read(&mut early), [0; 0]);
+        let mut writer = EventWriter::append(&path).unwrap();
+        writer.write(&entry(9)).unwrap();
+        assert_eq!(read(&mut early), [9]);
     }
 
     #[test]

@@ -13,7 +13,7 @@ mod words;
 pub use entry::{NamedFault, NamedStep, TimelineEntry};
 pub use event_file::{EventReader, EventWriter};
 pub use timeline::Timeline;
-pub use told::{MISSES_APART_NS, told};
+pub use told::{PendingMisses, told};
 pub use wall_clock::{WallClock, time_of_day};
 pub use weighing::{NamedSecond, NamedState, NamedWeighing};
 pub use words::{degraded as degraded_text, watchdog as watchdog_text};

@@ -3,7 +3,7 @@
 use crate::entry::TimelineEntry;
 
 /// Misses of a service that lie closer are told together, ns.
-pub const MISSES_APART_NS: u64 = 1_000_000_000;
+const MISSES_APART_NS: u64 = 1_000_000_000;
 
 /// The entries for people: without what only programs read, and misses of a service that follow
 /// each other within a second as one.
@@ -45,6 +45,67 @@ impl TimelineEntry {
         let during_s = later.t_ns.saturating_sub(self.t_ns) as f64 * 1e-9;
         self.count = Some(count);
         self.what = format!("{count} cycles in {during_s:.1} s");
+    }
+}
+
+/// Misses while they come: the first of a service is told at once, those of the second that follows
+/// together when it is over.
+#[derive(Debug, Default)]
+pub struct PendingMisses(Vec<ServiceMisses>);
+
+#[derive(Debug)]
+struct ServiceMisses {
+    service: String,
+    untold: Option<TimelineEntry>,
+    until_ns: u64,
+}
+
+impl PendingMisses {
+    /// What is to be told now that this has happened, in order.
+    pub fn add(&mut self, entry: &TimelineEntry) -> Vec<TimelineEntry> {
+        if !entry.is_told() {
+            return Vec::new();
+        }
+        if !entry.is_miss() {
+            let mut told = self.due(u64::MAX);
+            told.push(entry.clone());
+            return told;
+        }
+        let mut pending = self.0.iter_mut();
+        match pending.find(|misses| misses.service == entry.service) {
+            Some(misses) => {
+                match &mut misses.untold {
+                    Some(untold) => untold.add_miss(entry),
+                    untold => *untold = Some(entry.clone()),
+                }
+                Vec::new()
+            }
+            None => {
+                self.0.push(ServiceMisses {
+                    service: entry.service.clone(),
+                    untold: None,
+                    until_ns: entry.t_ns.saturating_add(MISSES_APART_NS),
+                });
+                vec![entry.clone()]
+            }
+        }
+    }
+
+    /// The misses whose second is over at `now_ns`.
+    pub fn due(&mut self, now_ns: u64) -> Vec<TimelineEntry> {
+        let mut told = Vec::new();
+        self.0.retain_mut(|misses| {
+            if now_ns < misses.until_ns {
+                return true;
+            }
+            misses.until_ns = now_ns.saturating_add(MISSES_APART_NS);
+            let untold = misses.untold.take();
+            // Who misses on is not told at once again.
+            let goes_on = untold.is_some() && now_ns < u64::MAX;
+            told.extend(untold);
+            goes_on
+        });
+        told
     }
 }
 
@@ -91,5 +152,26 @@ mod tests {
             ]
         );
         assert_eq!(told[0].t_s, Some(1.0));
+    }
+
+    #[test]
+    fn misses_are_told_at_once_and_then_each_second() {
+        let mut pending = PendingMisses::default();
+        let lines = |told: Vec<TimelineEntry>| -> Vec<String> {
+            let line = |entry: TimelineEntry| format!("{} {}", entry.service, entry.what);
+            told.into_iter().map(line).collect()
+        };
+        let miss = |t_s| entry(t_s, "detector", "miss");
+        assert_eq!(lines(pending.add(&miss(1.0))), ["detector 2 cycles"]);
+        assert_eq!(lines(pending.add(&miss(1.1))), [""; 0]);
+        assert_eq!(lines(pending.add(&miss(1.9))), [""; 0]);
+        assert_eq!(lines(pending.due(1_900_000_000)), [""; 0]);
+        let second = "detector 4 cycles in 0.8 s";
+        assert_eq!(lines(pending.due(2_000_000_000)), [second]);
+        assert_eq!(lines(pending.add(&miss(2.5))), [""; 0]);
+        let alarm = entry(2.6, "detector", "alarm");
+        let told = lines(pending.add(&alarm));
+        assert_eq!(told, ["detector 2 cycles", "detector 2 cycles"]);
+        assert_eq!(lines(pending.add(&miss(2.7))), ["detector 2 cycles"]);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::error::Error;
 use std::fs;
+use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -247,17 +248,36 @@ fn blackbox(setup: &Setup) -> Finding {
             "blackbox.enabled is false: nothing is kept",
         );
     }
-    let folder = settings.folder(&setup.path, &setup.file.graph.name);
+    let graph = &setup.file.graph;
     let detail = format!(
-        "{} MiB of memory, recordings of at most {} MiB in {}",
+        "{} MiB of memory, {:.0} s at {} Hz; at most {} MiB of recordings",
         settings.memory_mib,
+        settings.memory_s(graph.rate_hz),
+        graph.rate_hz,
         settings.folder_mib,
-        folder.display()
     );
-    match fs::create_dir_all(&folder) {
-        Ok(()) => finding("black box", Status::Ok, detail),
-        Err(error) => finding("black box", Status::Failure, format!("{detail}: {error}")),
+    let folders = settings.folders(&setup.path, &graph.name);
+    match folders.iter().find(|folder| can_be_written(folder)) {
+        Some(folder) => {
+            let detail = format!("{detail} in {}", folder.display());
+            finding("black box", Status::Ok, detail)
+        }
+        None => {
+            let detail = format!("{detail}; no folder for them can be written");
+            finding("black box", Status::Warning, detail)
+        }
     }
+}
+
+/// True if a file can be made in the folder, or in the nearest that is there; nothing is left.
+fn can_be_written(folder: &Path) -> bool {
+    let nearest = folder.ancestors().find(|folder| folder.is_dir());
+    nearest.is_some_and(|nearest| {
+        let probe = nearest.join(format!(".probe-{}", std::process::id()));
+        let is_made = fs::File::create(&probe).is_ok();
+        let _ = fs::remove_file(probe);
+        is_made
+    })
 }
 
 fn residue(setup: &Setup) -> Finding {

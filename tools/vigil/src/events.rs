@@ -3,10 +3,10 @@
 use std::io;
 use std::time::Duration;
 
-use vigil_cycle::signal;
+use vigil_cycle::{Clock, Monotonic, signal};
 use vigil_setup::RunningArgs;
 use vigil_terminal::{CommandError, Outcome, output};
-use vigil_timeline::{EventReader, TimelineEntry, told};
+use vigil_timeline::{EventReader, PendingMisses, TimelineEntry, told};
 
 /// Between two looks while following.
 const POLL: Duration = Duration::from_millis(50);
@@ -56,12 +56,26 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         return Ok(Outcome::Done);
     }
     signal::install();
+    let mut misses = PendingMisses::default();
     while !signal::stop_requested() {
         // Before the events: what is written until then belongs to it.
         let lives = running.lives();
-        print(args, &new(&mut reader)?).map_err(CommandError::failure)?;
+        let new = new(&mut reader)?;
+        let told = match args.json {
+            true => new,
+            false => {
+                let told = new.iter().flat_map(|entry| misses.add(entry));
+                let mut told: Vec<TimelineEntry> = told.collect();
+                let now_ns = if lives { Monotonic.now_ns() } else { u64::MAX };
+                told.extend(misses.due(now_ns));
+                told
+            }
+        };
+        print(args, &told).map_err(CommandError::failure)?;
         if !lives {
             eprintln!("the graph has ended");
+        }
+        if !lives || output::is_closed() {
             break;
         }
         std::thread::sleep(POLL);
@@ -80,7 +94,6 @@ fn print(args: &Args, entries: &[TimelineEntry]) -> io::Result<()> {
     if args.json {
         return entries.iter().try_for_each(output::json_line);
     }
-    told(entries)
-        .iter()
-        .try_for_each(|entry| output::line(&entry.line()))
+    let mut lines = entries.iter().map(TimelineEntry::line);
+    lines.try_for_each(|line| output::line(&line))
 }

@@ -38,7 +38,7 @@ const fn edge(from: &'static str, to: &'static str, topic: &'static str) -> Edge
 }
 
 /// Who sends what to whom. `robot` stands for whoever sends frames and obeys actions.
-const EDGES: [Edge; 11] = [
+const EDGES: [Edge; 14] = [
     edge("robot", "detector", "sensor"),
     edge("robot", "identifier", "sensor"),
     edge("robot", "supervisor", "sensor"),
@@ -50,6 +50,9 @@ const EDGES: [Edge; 11] = [
     edge("supervisor", "vigil", "faults"),
     edge("identifier", "vigil", "diagnosis/particles"),
     edge("services", "launcher", "health/*"),
+    edge("services", "blackbox", "every topic"),
+    edge("vigil", "robot", "control/sensor-sim"),
+    edge("vigil", "supervisor", "control/supervisor"),
 ];
 
 /// Prints the drawing.
@@ -79,6 +82,7 @@ fn nodes(setup: &Setup) -> Vec<(&'static str, String)> {
     }
     nodes.push(("services", "every service".to_owned()));
     nodes.push(("launcher", "launcher".to_owned()));
+    nodes.push(("blackbox", "black box".to_owned()));
     nodes.push(("vigil", "vigil, observers".to_owned()));
     nodes
 }

@@ -40,8 +40,9 @@ struct ListedGraph {
     blackbox: Option<u32>,
     /// Since its start, s.
     up_s: Option<f64>,
-    /// Where its configuration was read from; null for `check-publisher` and `record`, which listen
-    /// in place of a graph.
+    /// True of `check-publisher` and `record`, which listen in place of a graph.
+    listens: bool,
+    /// Where its configuration was read from; null if it listens, or is of another version.
     config: Option<String>,
     /// Rate of its schedule.
     rate_hz: Option<f64>,
@@ -65,7 +66,7 @@ struct ListedService {
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let names = Domain::all_running();
     let graphs: Vec<ListedGraph> = names.iter().filter_map(|name| listed(name)).collect();
-    let is_orphaned = |graph: &ListedGraph| graph.config.is_some() && graph.launcher.is_none();
+    let is_orphaned = |graph: &ListedGraph| !graph.listens && graph.launcher.is_none();
     let orphaned = graphs.iter().any(is_orphaned);
     let printed = match args.json {
         true => output::json(&Document {
@@ -98,6 +99,7 @@ fn listed(name: &str) -> Option<ListedGraph> {
     Some(ListedGraph {
         name: name.to_owned(),
         launcher: processes.launcher,
+        listens: domain.members().is_empty(),
         services: services.collect(),
         blackbox: processes.blackbox,
         up_s: up.and_then(Result::ok).map(|up| up.as_secs_f64().round()),
@@ -113,9 +115,13 @@ fn text(graphs: &[ListedGraph]) -> String {
     let lines = graphs.iter().map(|graph| {
         let name = &graph.name;
         let up = graph.up_s.map_or("?".to_owned(), duration_text);
-        let (Some(config), Some(rate_hz)) = (&graph.config, graph.rate_hz) else {
+        if graph.listens {
             return format!("{name:<16} listens to a publisher; no graph runs");
-        };
+        }
+        let config = graph.config.as_deref().unwrap_or("of another version");
+        let rate_hz = graph
+            .rate_hz
+            .map_or("?".to_owned(), |hz| format!("{hz:.0}"));
         let launcher = match graph.launcher {
             Some(pid) => format!("launcher {pid}"),
             None => format!(
@@ -161,6 +167,7 @@ mod tests {
         let graph = |launcher, config: Option<&str>| ListedGraph {
             name: "rover".to_owned(),
             launcher,
+            listens: config.is_none(),
             services: vec![ListedService {
                 name: "detector",
                 pid: 7,

@@ -29,7 +29,7 @@ pub struct Args {
 /// A graph that does not run, or has no black box.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let running = args.running.find().map_err(CommandError::failure)?;
-    let (domain, setup) = (&running.domain, &running.setup);
+    let domain = &running.domain;
     let name = domain.graph();
     let lives = |pid| domain.find_process(pid).is_some();
     if !running.processes().blackbox.is_some_and(lives) {
@@ -37,7 +37,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         return Err(CommandError::failure(message));
     }
     let request = domain.request_file();
-    let begun = request.with_extension("begun");
+    let begun = request.with_extension(std::process::id().to_string());
     // The box meets all of it, or nothing.
     fs::write(&begun, &args.text)
         .and_then(|()| fs::rename(&begun, &request))
@@ -51,7 +51,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         }
         std::thread::sleep(POLL);
     }
-    let folder = setup.file.blackbox.folder(&setup.path, name);
-    output::line(&folder.display().to_string()).map_err(CommandError::failure)?;
+    let folder = fs::read_to_string(domain.recordings_file());
+    let folder = folder.map_err(CommandError::failure)?;
+    output::line(&folder).map_err(CommandError::failure)?;
     Ok(Outcome::Done)
 }

@@ -2,14 +2,16 @@
 
 use std::time::{Duration, Instant};
 
-use vigil_cycle::{Domain, FoundProcess, signal};
+use vigil_cycle::{Domain, signal};
 use vigil_setup::{NotRunning, RunningArgs};
 use vigil_terminal::{CommandError, Outcome};
 use vigil_timeline::EventWriter;
 
-/// Time that a launcher may take to stop its services, and they to stop without it: the launcher
-/// waits three seconds for each.
-const LIMIT: Duration = Duration::from_secs(15);
+/// Time that a graph may take to stop: its launcher waits three seconds for each service, and
+/// twenty for the black box to finish a recording.
+const LIMIT: Duration = Duration::from_secs(40);
+/// Time that a process may take without a launcher.
+const PROCESS_LIMIT: Duration = Duration::from_secs(20);
 /// Between two looks.
 const POLL: Duration = Duration::from_millis(10);
 
@@ -39,10 +41,17 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     };
     match domain.processes().launcher {
         Some(launcher) => signal::terminate(launcher),
+        None if domain.members().is_empty() => {
+            return Err(CommandError::failure(format!(
+                "`vigil check-publisher` or `vigil record` listens in the place of graph '{}': \
+                 end it by Ctrl-C",
+                domain.graph()
+            )));
+        }
         None => stop_services(&domain)?,
     }
     let name = domain.graph();
-    match until(|| Domain::running(name).is_none()) {
+    match until(LIMIT, || Domain::running(name).is_none()) {
         true => {
             eprintln!("graph '{name}' has stopped");
             Ok(Outcome::Done)
@@ -63,16 +72,17 @@ fn stop_services(domain: &Domain) -> Result<(), CommandError> {
         return Err(CommandError::failure(message));
     };
     let listed = domain.processes();
+    // The last of the chain first, so that none waits for input in vain; the black box last, for
+    // it records how they ended; and what nobody has listed.
     let services = listed.services.into_iter().rev().map(|(_, pid)| pid);
-    // Last: it records how they ended.
     let pids = services.chain(listed.blackbox);
-    let services = pids.filter_map(|pid| domain.find_process(pid));
-    let services: Vec<FoundProcess> = services.collect();
-    for service in &services {
-        service.terminate();
-        if !until(|| !service.lives()) {
-            eprintln!("process {} did not stop: killed", service.id());
-            service.kill();
+    let listed = pids.filter_map(|pid| domain.find_process(pid));
+    for process in listed.chain(domain.members()) {
+        process.terminate();
+        if !until(PROCESS_LIMIT, || !process.lives()) {
+            eprintln!("process {} did not stop: killed", process.id());
+            process.kill();
+            until(PROCESS_LIMIT, || !process.lives());
         }
     }
     // Who holds the lock now has no service alive.
@@ -83,14 +93,14 @@ fn stop_services(domain: &Domain) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Waits until `look` is true, for [`LIMIT`] at most; false if it never was.
-fn until(mut look: impl FnMut() -> bool) -> bool {
+/// Waits until `look` is true, for `limit` at most; false if it never was.
+fn until(limit: Duration, mut look: impl FnMut() -> bool) -> bool {
     let began = Instant::now();
     loop {
         if look() {
             return true;
         }
-        if began.elapsed() > LIMIT {
+        if began.elapsed() > limit {
             return false;
         }
         std::thread::sleep(POLL);

@@ -190,7 +190,8 @@ fn services_of_a_launcher_that_is_gone_are_adopted_restarted_and_stopped() {
     let Claim::Orphaned(locks) = Claim::take(&graph.domain).unwrap() else {
         panic!("the services hold the graph's lock");
     };
-    let mut children = Children::adopt(&graph.plan, &graph.domain, locks).unwrap();
+    let children = Children::adopt(&graph.plan, &graph.domain, &mut graph.observer, locks);
+    let mut children = children.unwrap();
     let adopted: Vec<u32> = children.services.iter().map(|s| s.process.id()).collect();
     assert_eq!(adopted, started);
 
