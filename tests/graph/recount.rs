@@ -93,7 +93,7 @@ fn the_monitors_count_what_the_stamps_say() {
     // Long queues: this observer is an ordinary process and must not lose a block.
     let folder = std::env::temp_dir().join(unique("recount"));
     let path = config_with(&folder, |text| {
-        format!("{text}\n[transport]\nbuffer = 256\nmax_subscribers = 4\n")
+        format!("{text}\n[transport]\nbuffer = 256\nmax_subscribers = 6\n")
     });
 
     let mut graph =

@@ -4,7 +4,6 @@ use std::io::Write;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use vigil_blocks::EventKind;
 use vigil_cycle::port::Link;
 use vigil_cycle::{Clock, Domain, Monotonic, signal};
 use vigil_setup::{RunningArgs, RunningGraph};
@@ -259,7 +258,7 @@ impl Watch<'_> {
             if signal::stop_requested() {
                 return EndReason::Stopped;
             }
-            if observer.timeline.has(EventKind::EndOfRecording) {
+            if observer.timeline.recording_end_ns().is_some() {
                 // Input that is missing from now on is no failure.
                 let since = *recording_ended.get_or_insert_with(Instant::now);
                 if since.elapsed() > DRAIN {

@@ -44,7 +44,7 @@ pub struct Queues {
     pub history: usize,
     /// Readers of one topic, observers included.
     #[default(8)]
-    #[schemars(range(min = 4, max = 32), extend("x-unit" = "readers"))]
+    #[schemars(range(min = 6, max = 32), extend("x-unit" = "readers"))]
     pub max_subscribers: usize,
 }
 

@@ -11,6 +11,9 @@ use crate::entry::TimelineEntry;
 use crate::namer::Namer;
 use crate::record::Record;
 
+/// Events that are kept: a day of a robot that decides each second.
+const RECORDS_MAX: usize = 100_000;
+
 /// All events of a run.
 pub struct Timeline {
     namer: Namer,
@@ -22,6 +25,7 @@ pub struct Timeline {
     told_ns: [u64; ServiceName::ALL.len()],
     origin_ns: Option<u64>,
     closed_ns: Option<u64>,
+    recording_end_ns: Option<u64>,
 }
 
 impl Timeline {
@@ -35,6 +39,7 @@ impl Timeline {
             overwritten: 0,
             told_ns: [0; ServiceName::ALL.len()],
             closed_ns: None,
+            recording_end_ns: None,
         }
     }
 
@@ -46,6 +51,9 @@ impl Timeline {
         {
             if event.kind == EventKind::Ready as u32 {
                 self.begin(event.t_ns);
+            }
+            if event.kind == EventKind::EndOfRecording as u32 {
+                self.recording_end_ns.get_or_insert(event.value);
             }
             self.records.push(Record {
                 service,
@@ -128,9 +136,8 @@ impl Timeline {
     }
 
     /// Scheduled instant of a recording's last frame, ns, once it has been played.
-    pub fn recording_end_ns(&self) -> Option<u64> {
-        self.first_record(EventKind::EndOfRecording)
-            .map(|record| record.event.value)
+    pub const fn recording_end_ns(&self) -> Option<u64> {
+        self.recording_end_ns
     }
 
     /// False for what follows from the end of a recording alone: that input is missing.
@@ -161,6 +168,7 @@ impl Timeline {
         if origin_ns.is_none() && !is_late {
             return Vec::new();
         }
+        self.forget();
         let from = std::mem::replace(&mut self.taken, self.records.len());
         self.records[from..].sort_by_key(|record| record.event.t_ns);
         let new = self.records[from..].iter();
@@ -173,9 +181,23 @@ impl Timeline {
             .collect()
     }
 
-    fn first_record(&self, kind: EventKind) -> Option<&Record> {
-        let mut records = self.records.iter();
-        records.find(|record| record.event.kind == kind as u32)
+    /// Forgets a quarter of what has been handed out, once there is too much: a robot drives for
+    /// weeks. What was broken stays, as a simulator that is restarted has to know.
+    fn forget(&mut self) {
+        if self.records.len() <= RECORDS_MAX {
+            return;
+        }
+        let last = self.taken.min(RECORDS_MAX / 4);
+        let stays = [EventKind::Injected, EventKind::Restored].map(|kind| kind as u32);
+        let before = self.records.len();
+        let mut at = 0;
+        self.records.retain(|record| {
+            at += 1;
+            at > last || stays.contains(&record.event.kind)
+        });
+        let forgotten = before - self.records.len();
+        self.taken -= forgotten;
+        self.overwritten += forgotten as u64;
     }
 
     /// Seconds for which the detector was blind, by cause, until `end_ns`.
@@ -183,11 +205,6 @@ impl Timeline {
         let mut sorted: Vec<&Event> = self.records.iter().map(|record| &record.event).collect();
         sorted.sort_by_key(|event| event.t_ns);
         blind_s(sorted.into_iter(), end_ns)
-    }
-
-    /// True if an event of this kind is there.
-    pub fn has(&self, kind: EventKind) -> bool {
-        self.first_record(kind).is_some()
     }
 
     /// Every event in words, in order.

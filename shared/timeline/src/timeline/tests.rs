@@ -46,7 +46,6 @@ fn events_are_told_in_order_from_the_beginning_of_the_drive() {
         (timeline.origin_ns(), timeline.overwritten()),
         (Some(10 * S), 2)
     );
-    assert!(timeline.has(EventKind::Alarm) && !timeline.has(EventKind::Goal));
     timeline.begin(99);
     assert_eq!(timeline.origin_ns(), Some(10 * S), "it begins once");
 }
@@ -235,4 +234,32 @@ fn what_another_launcher_has_told_is_not_told_again_and_times_go_on() {
     assert_eq!(second.overwritten(), 0);
     second.add_overwritten(ServiceName::Detector, 1);
     assert_eq!(second.overwritten(), 1);
+}
+
+#[test]
+fn of_weeks_the_newest_events_and_all_changes_are_kept() {
+    let mut timeline = timeline();
+    timeline.begin(0);
+    let broken = event(1, EventKind::Injected, 0, 0);
+    timeline.add(ServiceName::SensorSim, &broken);
+    let last = RECORDS_MAX as u64 + 10;
+    for t_s in 2..=last {
+        let miss = event(t_s, EventKind::Miss, 0, 1);
+        timeline.add(ServiceName::Detector, &miss);
+        if t_s % 1000 == 0 {
+            timeline.take_new(true);
+        }
+    }
+    assert!(timeline.take_new(true).len() < 1000);
+    let entries = timeline.entries();
+    assert_eq!(entries.len() as u64 + timeline.overwritten(), last);
+    assert!(timeline.overwritten() > 0);
+    let [first, second, ..] = entries.as_slice() else {
+        panic!("{} are left", entries.len());
+    };
+    assert_eq!(
+        (first.event.as_str(), second.event.as_str()),
+        ("injected", "miss")
+    );
+    assert_eq!(entries.last().unwrap().t_s, Some(last as f64));
 }
