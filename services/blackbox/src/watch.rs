@@ -41,7 +41,7 @@ pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     let rescue = left.as_deref().and_then(|left| rescue(&material, left));
     let kept = keep(&material);
     // Whatever happened: what was left is written before this process ends.
-    rescue.map(tell);
+    rescue.into_iter().for_each(tell);
     if let Some(left) = left {
         let _ = fs::remove_file(left);
     }
@@ -55,7 +55,7 @@ pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
 pub fn rescue_only(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     let material = Arc::new(material(running)?);
     let ring = material.running.domain.ring_file();
-    rescue(&material, &ring).map(tell);
+    rescue(&material, &ring).into_iter().for_each(tell);
     let _ = fs::remove_file(ring);
     Ok(())
 }
