@@ -68,8 +68,9 @@ fn a_fault_lives_from_its_onset_until_it_is_cleared_and_outlives_the_supervisor(
         (code, err.trim()),
         (2, "no fault 'LM_STUCK'; there are RM_STUCK (1)")
     );
-    let (code, _, err) = vigil(&name, &["ack", "RM_STUCK"]);
-    assert_eq!((code, err.trim()), (0, "acknowledged RM_STUCK"));
+    let acknowledged = format!("graph '{name}': acknowledged RM_STUCK");
+    let (code, _, err) = vigil(&name, &["ack", "rm_stuck"]);
+    assert_eq!((code, err.trim()), (0, acknowledged.as_str()));
     assert_eq!(listed(&name).1["faults"][0]["state"], "acknowledged");
     let again = vigil(&name, &["ack", "1"]);
     assert_eq!((again.0, again.2.trim()), (1, "1: nothing to acknowledge"));

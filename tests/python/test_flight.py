@@ -126,6 +126,9 @@ class BlackBox(unittest.TestCase):
             said = wait_for(lambda: vigil("snapshot", "odd noise", "--graph", graph.name).stdout, "an answer")
             self.assertEqual(said.strip(), str(self.folder / graph.name))
             path, *_ = wait_for(lambda: self.recordings("request"), "a recording")
+            listed = json.loads(vigil("recordings", "--json", "--graph", graph.name).stdout)
+            self.assertEqual(listed["folder"], str(self.folder / graph.name))
+            self.assertIn(path.name, [one["name"] for one in listed["recordings"]])
             graph.stop()
         self.assertEqual(Flight(path).about["vigil"]["what"], "odd noise")
 

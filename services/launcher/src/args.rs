@@ -7,6 +7,7 @@ use vigil_setup::GraphArgs;
 
 /// Starts a graph, watches it, and prints what happened.
 ///
+/// What happens goes to standard error as it comes, the summary to standard output at the end.
 /// It ends with Ctrl-C, or after --duration. Exit codes: 0 done, 1 the run had a failure, was
 /// blind, or saw no cycle, 2 a wrong option or configuration, and nothing was started.
 #[derive(Debug, Clone, clap::Parser)]

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use vigil_cycle::port::Link;
 use vigil_cycle::{Clock, Domain, Monotonic, signal};
 use vigil_setup::{RunningArgs, RunningGraph};
-use vigil_timeline::EventWriter;
+use vigil_timeline::{EventWriter, TimelineEntry, WallClock};
 
 use crate::args::LauncherArgs;
 use crate::children::Children;
@@ -116,7 +116,7 @@ impl OwnGraph {
             Claim::Free(_) => return Err(Refusal(format!("graph '{name}' has just ended"))),
             Claim::Held => {
                 return Err(Refusal(format!(
-                    "graph '{name}' has a launcher ({})",
+                    "graph '{name}' has a launcher ({}); `vigil stop --graph {name}` ends it",
                     processes(&running.domain)
                 )));
             }
@@ -163,6 +163,19 @@ impl OwnGraph {
             );
         }
         let mut teller = Teller::new(&domain.events_file(), !args.json);
+        if args.adopt {
+            let clock = WallClock::now();
+            let t_ns = Monotonic.now_ns();
+            teller.tell(&TimelineEntry {
+                t_s: observer.since_ready_s(),
+                t_ns,
+                wall: clock.rfc3339(t_ns),
+                service: "launcher".to_owned(),
+                event: "adopted".to_owned(),
+                what: "the launcher before was gone".to_owned(),
+                ..TimelineEntry::default()
+            });
+        }
         let mut watch = Watch {
             args,
             plan: &plan,

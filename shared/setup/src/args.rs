@@ -25,7 +25,7 @@ pub struct GraphArgs {
     )]
     pub config: PathBuf,
     /// Rate of the schedule, Hz; replaces `graph.rate_hz`.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate: Option<f64>,
     /// Name of the graph; replaces `graph.name`, so that one file can run twice.
     #[arg(long, value_name = "NAME")]

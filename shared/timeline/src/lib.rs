@@ -14,6 +14,6 @@ pub use entry::{NamedFault, NamedStep, TimelineEntry};
 pub use event_file::{EventReader, EventWriter};
 pub use timeline::Timeline;
 pub use told::{PendingMisses, told};
-pub use wall_clock::{WallClock, time_of_day};
+pub use wall_clock::{WallClock, time_of_day, unix_time_of_day};
 pub use weighing::{NamedSecond, NamedState, NamedWeighing};
 pub use words::{degraded as degraded_text, watchdog as watchdog_text};

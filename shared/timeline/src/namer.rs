@@ -168,6 +168,7 @@ impl Namer {
             EventKind::Step => text_of(self.step(event)),
             EventKind::Fault => text_of(self.fault(event)),
             EventKind::Particles => format!("{} of {}", event.what, event.value),
+            EventKind::Refused => "an order that there was nothing to do for".into(),
             EventKind::Watchdog => {
                 let found = WatchdogFinding::from_repr(event.what);
                 found.map_or("?", words::watchdog).into()

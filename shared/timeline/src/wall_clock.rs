@@ -53,6 +53,16 @@ impl WallClock {
     }
 }
 
+/// Time of day where the machine stands, of seconds since 1970.
+#[must_use]
+pub fn unix_time_of_day(unix_s: f64) -> String {
+    let timestamp = Timestamp::from_millisecond((unix_s * 1e3) as i64);
+    timestamp.map_or_else(
+        |_| "?".to_owned(),
+        |timestamp| time_of_day(&format!("{timestamp:.3}")),
+    )
+}
+
 /// Time of day where the machine stands, of an instant as [`WallClock::rfc3339`] writes it.
 #[must_use]
 pub fn time_of_day(rfc3339: &str) -> String {
@@ -88,5 +98,8 @@ mod tests {
         let text = time_of_day("2023-11-14T22:13:32.345Z");
         assert!(text.ends_with(":32.345"), "{text}");
         assert_eq!(time_of_day("yesterday"), "?");
+        let same = unix_time_of_day(1_699_999_212.345 + 800.0);
+        assert_eq!(same, time_of_day("2023-11-14T22:13:32.345Z"));
+        assert_eq!(unix_time_of_day(f64::MAX), "?");
     }
 }

@@ -1,18 +1,8 @@
 //! Standard output and standard error. A reader that closed its end has seen enough: not an error.
 
 use std::io::{self, ErrorKind, IsTerminal, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
-
-/// True once a reader has closed its end.
-static CLOSED: AtomicBool = AtomicBool::new(false);
-
-/// True once the reader of standard output has closed its end: who prints on may end.
-#[must_use]
-pub fn is_closed() -> bool {
-    CLOSED.load(Ordering::Relaxed)
-}
 
 /// Prints one JSON document, pretty, ended by a line break.
 ///
@@ -38,10 +28,7 @@ pub fn line(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     let result = writeln!(out, "{text}").and_then(|()| out.flush());
     match result {
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => {
-            CLOSED.store(true, Ordering::Relaxed);
-            Ok(())
-        }
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         Err(error) => Err(io::Error::new(
             error.kind(),
             format!("standard output: {error}"),

@@ -3,7 +3,7 @@
 use std::io;
 use std::time::Duration;
 
-use vigil_cycle::{Clock, Monotonic, signal};
+use vigil_cycle::{Clock, Monotonic, has_hung_up, signal};
 use vigil_setup::RunningArgs;
 use vigil_terminal::{CommandError, Outcome, output};
 use vigil_timeline::{EventReader, PendingMisses, TimelineEntry, told};
@@ -75,7 +75,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         if !lives {
             eprintln!("the graph has ended");
         }
-        if !lives || output::is_closed() {
+        if !lives || has_hung_up(&io::stdout()) {
             break;
         }
         std::thread::sleep(POLL);

@@ -64,6 +64,9 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             print(args, &newest).map_err(CommandError::failure)?;
             document = newest;
         }
+        if vigil_cycle::has_hung_up(&std::io::stdout()) {
+            break;
+        }
         if !view.is_running() {
             eprintln!("the graph has ended");
             break;

@@ -60,7 +60,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     block.parameter[..PARAMETERS].copy_from_slice(&wire.parameter);
     match send(&graph, simulator, sender.as_mut())? {
         Some(true) => {
-            eprintln!("injected {spec}");
+            let graph = running.domain.graph();
+            eprintln!("graph '{graph}': injected {spec}");
             Ok(Outcome::Done)
         }
         Some(false) => Err(CommandError::failure("the simulator refused the injection")),

@@ -17,6 +17,7 @@ mod print_channels;
 mod print_types;
 mod publisher;
 mod record;
+mod recordings;
 mod run;
 mod schemas;
 mod shell;
@@ -56,6 +57,7 @@ enum Command {
     Clear(faults::ClearArgs),
     Inject(inject::Args),
     Snapshot(snapshot::Args),
+    Recordings(recordings::Args),
     Check(check::Args),
     #[command(mut_args(only_of_the_border))]
     CheckPublisher(check_publisher::Args),
@@ -100,6 +102,7 @@ fn main() -> ExitCode {
         Command::Clear(args) => faults::clear(&args),
         Command::Inject(args) => inject::run(&args),
         Command::Snapshot(args) => snapshot::run(&args),
+        Command::Recordings(args) => recordings::run(&args),
         Command::Record(args) => record::run(&args),
         Command::PrintChannels(args) => print_channels::run(&args),
         Command::PrintTypes(args) => print_types::run(&args),

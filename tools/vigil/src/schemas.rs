@@ -7,7 +7,7 @@ use vigil_launcher::Summary;
 use vigil_terminal::{CommandError, Outcome, output};
 use vigil_timeline::TimelineEntry;
 
-use crate::{check, check_publisher, config, faults, list, record, status};
+use crate::{check, check_publisher, config, faults, list, record, recordings, status};
 
 /// Prints the JSON Schema of what a command prints with --json.
 ///
@@ -30,7 +30,7 @@ fn schema_of<T: schemars::JsonSchema>() -> Schema {
 }
 
 /// The commands that print JSON, each with its schema.
-const SCHEMAS: [(&str, Make); 9] = [
+const SCHEMAS: [(&str, Make); 10] = [
     ("run", schema_of::<Summary>),
     ("list", schema_of::<list::Document>),
     ("status", schema_of::<status::Document>),
@@ -43,6 +43,7 @@ const SCHEMAS: [(&str, Make); 9] = [
     ),
     ("config", schema_of::<config::Effective<'_>>),
     ("record", schema_of::<record::Document>),
+    ("recordings", schema_of::<recordings::Document>),
 ];
 
 /// Prints or writes schemas.

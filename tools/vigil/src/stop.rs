@@ -1,5 +1,6 @@
 //! `vigil stop`: ends a running graph, with its launcher or without.
 
+use std::io::{self, IsTerminal};
 use std::time::{Duration, Instant};
 
 use vigil_cycle::{Domain, signal};
@@ -18,7 +19,7 @@ const POLL: Duration = Duration::from_millis(10);
 /// Stops a running graph; the robot's adapter then holds no valid action, and stops the robot.
 ///
 /// Its launcher stops the services and prints its summary. Without a launcher this command ends the
-/// services itself. Nothing is left behind.
+/// services itself. Nothing is left behind. Without --graph it asks, at a terminal.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -31,6 +32,9 @@ pub struct Args {
 /// A graph that does not run; one that does not end.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let running = args.running.find();
+    if let (None, Ok(running)) = (&args.running.graph, &running) {
+        demand_consent(running.domain.graph())?;
+    }
     let domain = match running {
         Ok(running) => running.domain,
         // Whatever it runs on, it can be stopped.
@@ -60,6 +64,22 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             "graph '{name}' did not stop within {} s",
             LIMIT.as_secs()
         ))),
+    }
+}
+
+/// Asks whether the only graph that runs is meant.
+fn demand_consent(name: &str) -> Result<(), CommandError> {
+    if !io::stdin().is_terminal() {
+        let message = format!("say which graph: `vigil stop --graph {name}`");
+        return Err(CommandError::usage(message));
+    }
+    eprint!("stop graph '{name}'? [y/N] ");
+    let mut answer = String::new();
+    let read = io::stdin().read_line(&mut answer);
+    read.map_err(CommandError::failure)?;
+    match answer.trim() {
+        "y" | "Y" | "yes" => Ok(()),
+        _ => Err(CommandError::failure("nothing was stopped")),
     }
 }
 

@@ -137,6 +137,11 @@ fn rounded(seconds: f64) -> f64 {
 }
 
 impl Document {
+    /// Name of the graph.
+    pub fn graph(&self) -> &str {
+        &self.graph
+    }
+
     /// A block with the names that a configuration gives.
     pub fn new(block: &Faults, setup: &Setup) -> Self {
         Self::at(block, setup, Now::new())

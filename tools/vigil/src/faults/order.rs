@@ -36,15 +36,18 @@ pub struct ClearArgs {
 pub fn acknowledge(args: &AckArgs) -> Result<Outcome, CommandError> {
     let mut view = View::join(&args.running)?;
     let document = view.first()?;
-    let number = match args.fault.as_str() {
-        "all" => 0,
-        fault => find(&document, fault)?.number,
+    let (number, name) = match args.fault.as_str() {
+        "all" => (0, "all"),
+        fault => {
+            let fault = find(&document, fault)?;
+            (fault.number, fault.name.as_str())
+        }
     };
     let number = u32::try_from(number).map_err(CommandError::failure)?;
     order(&view, ControlCommand::Acknowledge, number)?
         .then_some(())
         .ok_or_else(|| CommandError::failure(format!("{}: nothing to acknowledge", args.fault)))?;
-    eprintln!("acknowledged {}", args.fault);
+    eprintln!("graph '{}': acknowledged {name}", document.graph());
     Ok(Outcome::Done)
 }
 
@@ -54,9 +57,10 @@ pub fn acknowledge(args: &AckArgs) -> Result<Outcome, CommandError> {
 /// As [`acknowledge`].
 pub fn clear(args: &ClearArgs) -> Result<Outcome, CommandError> {
     let view = View::join(&args.running)?;
+    let graph = view.graph_name();
     match order(&view, ControlCommand::Forget, 0)? {
-        true => eprintln!("forgot the faults that were over"),
-        false => eprintln!("no fault was over"),
+        true => eprintln!("graph '{graph}': forgot the faults that were over"),
+        false => eprintln!("graph '{graph}': no fault was over"),
     }
     Ok(Outcome::Done)
 }
@@ -75,7 +79,9 @@ fn order(view: &View, command: ControlCommand, fault: u32) -> Result<bool, Comma
 
 /// The fault of a name or number; of several of one name, the one that changed last.
 fn find<'a>(document: &'a Document, fault: &str) -> Result<&'a NamedFault, CommandError> {
-    let is_meant = |it: &&NamedFault| it.name == fault || it.number.to_string() == fault;
+    let is_meant = |it: &&NamedFault| {
+        it.name.eq_ignore_ascii_case(fault) || it.number.to_string() == fault
+    };
     document.faults.iter().find(is_meant).ok_or_else(|| {
         let names = document.faults.iter();
         let names: Vec<String> = names

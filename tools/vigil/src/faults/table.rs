@@ -1,5 +1,7 @@
 //! Faults for people.
 
+use vigil_timeline::unix_time_of_day;
+
 use super::document::{Document, NamedFault};
 
 /// The overall state, and a line for each fault with why below it.
@@ -9,8 +11,8 @@ pub fn text(document: &Document) -> String {
         lines.push("no faults".to_owned());
     } else {
         lines.push(format!(
-            "{:>3}  {:<14} {:<12} {:>9} {:>9} {:>5}  {:<16} {}",
-            "no.", "fault", "state", "since", "first", "times", "action", "p"
+            "{:>3}  {:<14} {:<12} {:>9}  {:<12} {:>5}  {:<16} {}",
+            "no.", "fault", "state", "for", "first at", "times", "action", "p"
         ));
     }
     for fault in &document.faults {
@@ -31,12 +33,12 @@ pub fn text(document: &Document) -> String {
 
 fn line(fault: &NamedFault) -> String {
     format!(
-        "{:>3}  {:<14} {:<12} {:>9} {:>9} {:>5}  {:<16} {:.3}",
+        "{:>3}  {:<14} {:<12} {:>9}  {:<12} {:>5}  {:<16} {:.3}",
         fault.number,
         fault.name,
         fault.state,
         ago(fault.changed_ago_s),
-        ago(fault.first_ago_s),
+        first_at(fault),
         fault.count,
         fault.action,
         fault.p,
@@ -52,6 +54,12 @@ pub fn why(fault: &NamedFault) -> String {
     let size = fault.size.as_ref().map(|size| size.text.clone());
     let parts = size.into_iter().chain(evidence);
     parts.collect::<Vec<String>>().join("; ")
+}
+
+/// Time of day at which it was present first.
+pub fn first_at(fault: &NamedFault) -> String {
+    let time = unix_time_of_day(fault.first_unix_s);
+    time.split('.').next().unwrap_or_default().to_owned()
 }
 
 /// A time that has passed, short.

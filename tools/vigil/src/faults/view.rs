@@ -92,6 +92,11 @@ impl View {
         )))
     }
 
+    /// Name of the graph.
+    pub fn graph_name(&self) -> &str {
+        self.running.domain.graph()
+    }
+
     /// True while the graph runs.
     pub fn is_running(&self) -> bool {
         self.running.lives()

@@ -97,7 +97,7 @@ fn fault_text(fault: &NamedFault) -> String {
         1 => "once".to_owned(),
         count => format!("{count} times"),
     };
-    format!("{name} {state} since {since}, {times}, p {p:.3}, {action}")
+    format!("{name} {state} for {since}, {times}, p {p:.3}, {action}")
 }
 
 fn services(services: &[Service]) -> Vec<String> {
@@ -164,7 +164,7 @@ mod tests {
             lines[..7],
             [
                 "rover: FAULT, 100 Hz, up 1 min 2 s, launcher 4711",
-                "faults     RM_STUCK active since 3 min, 2 times, p 0.998, compensate",
+                "faults     RM_STUCK active for 3 min, 2 times, p 0.998, compensate",
                 "             stuck; wheel rate RM says so by 5.4 nat, against RM_ENC",
                 "detector   p(fault) 0.998; ALARM, alarms so far 1",
                 "diagnosis  RM_STUCK; RM_STUCK 0.998  ND 0.001  UNKNOWN 0.001  LF_STUCK 0.000",

@@ -60,7 +60,7 @@ fn line(fault: &NamedFault, title: &'static str, palette: Palette) -> Line<'stat
     Line::from(vec![
         Span::styled(title, palette.title()),
         Span::styled(format!("{sign} {name:<12} {}", state.to_uppercase()), style),
-        Span::raw(format!("  since {since}  {times}  p {p:.3}  {action}")),
+        Span::raw(format!("  for {since}  {times}  p {p:.3}  {action}")),
     ])
 }
 

@@ -15,6 +15,8 @@ use crate::watch::{POLL, Watch};
 
 /// Between two pictures.
 const DRAW: Duration = Duration::from_millis(100);
+/// Time that an orderly end may take.
+const END: Duration = Duration::from_secs(1);
 /// Events that a page key scrolls by.
 const PAGE: usize = 5;
 
@@ -70,6 +72,7 @@ impl Look {
 /// # Errors
 /// The terminal's.
 pub fn run(watch: &mut Watch, palette: Palette) -> io::Result<()> {
+    end_in_time();
     let mut screen = Screen::take()?;
     let mut look = Look::default();
     let mut drawn: Option<Instant> = None;
@@ -98,6 +101,18 @@ pub fn run(watch: &mut Watch, palette: Palette) -> io::Result<()> {
         }
     }
     Ok(())
+}
+
+/// Ends this process soon after it was asked to, whatever it is at: the library does not come back
+/// from reading a terminal that is gone.
+fn end_in_time() {
+    std::thread::spawn(|| {
+        while !signal::stop_requested() {
+            std::thread::sleep(DRAW);
+        }
+        std::thread::sleep(END);
+        std::process::exit(1);
+    });
 }
 
 /// The wait between two looks: a key ends it, and a signal, which is no error.

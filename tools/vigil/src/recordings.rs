@@ -1,0 +1,140 @@
+//! `vigil recordings`: what the black box of a running graph has written.
+
+use std::fs;
+use std::path::Path;
+use std::time::UNIX_EPOCH;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use vigil_setup::RunningArgs;
+use vigil_terminal::{CommandError, Outcome, output};
+use vigil_timeline::unix_time_of_day;
+
+/// Lists the recordings that the black box of a running graph has written, the newest last.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    running: RunningArgs,
+    /// Print one JSON document.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What it prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
+    schema_version: u32,
+    /// Name of the graph.
+    graph: String,
+    /// Where they lie.
+    folder: String,
+    /// The recordings, the newest last.
+    recordings: Vec<ListedRecording>,
+}
+
+/// A recording.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+struct ListedRecording {
+    /// Name of the file; it holds graph, time (UTC) and reason.
+    name: String,
+    /// Its size.
+    bytes: u64,
+    /// When it was written last, since 1970.
+    written_unix_s: f64,
+    /// True if it is being written.
+    is_being_written: bool,
+}
+
+/// Prints them.
+///
+/// # Errors
+/// A graph that does not run, or has no black box.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let running = args.running.find().map_err(CommandError::failure)?;
+    let graph = running.domain.graph();
+    let folder = fs::read_to_string(running.domain.recordings_file()).map_err(|_| {
+        CommandError::failure(format!("graph '{graph}' has no black box, or not yet"))
+    })?;
+    let document = Document {
+        schema_version: 1,
+        graph: graph.to_owned(),
+        recordings: listed(Path::new(&folder), graph),
+        folder,
+    };
+    let printed = match args.json {
+        true => output::json(&document),
+        false => output::line(&text(&document)),
+    };
+    printed.map_err(CommandError::failure)?;
+    Ok(Outcome::Done)
+}
+
+fn listed(folder: &Path, graph: &str) -> Vec<ListedRecording> {
+    let begin = format!("{graph}-");
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let recordings = entries.filter_map(|entry| {
+        let (name, metadata) = (entry.file_name().into_string().ok()?, entry.metadata().ok()?);
+        let is_being_written = name.ends_with(".mcap.part");
+        let is_ours = name.starts_with(&begin) && (is_being_written || name.ends_with(".mcap"));
+        let written = metadata.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
+        is_ours.then_some(ListedRecording {
+            name,
+            bytes: metadata.len(),
+            written_unix_s: written.as_secs_f64(),
+            is_being_written,
+        })
+    });
+    let mut recordings: Vec<ListedRecording> = recordings.collect();
+    recordings.sort_by(|a, b| a.written_unix_s.total_cmp(&b.written_unix_s));
+    recordings
+}
+
+fn text(document: &Document) -> String {
+    let mut lines = vec![document.folder.clone()];
+    if document.recordings.is_empty() {
+        lines.push("no recordings".to_owned());
+    }
+    lines.extend(document.recordings.iter().map(|recording| {
+        let mib = recording.bytes as f64 / f64::from(1 << 20);
+        let time = unix_time_of_day(recording.written_unix_s);
+        let time = time.split('.').next().unwrap_or_default();
+        let state = match recording.is_being_written {
+            true => "  is being written",
+            false => "",
+        };
+        format!("  {time}  {mib:7.1} MiB  {}{state}", recording.name)
+    }));
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_graphs_own_recordings_are_listed_and_the_one_under_way_is_marked() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in [
+            "rover-1-alarm.mcap",
+            "other-1-alarm.mcap",
+            "rover.txt",
+            "rover-2-crash.mcap.part",
+        ] {
+            fs::write(folder.path().join(name), [0; 1 << 20]).unwrap();
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        let recordings = listed(folder.path(), "rover");
+        let names: Vec<_> = recordings.iter().map(|it| it.name.as_str()).collect();
+        assert_eq!(names, ["rover-1-alarm.mcap", "rover-2-crash.mcap.part"]);
+        let document = Document {
+            schema_version: 1,
+            graph: "rover".to_owned(),
+            folder: "f".to_owned(),
+            recordings,
+        };
+        let text = text(&document);
+        assert!(text.contains("1.0 MiB  rover-1-alarm.mcap\n"), "{text}");
+        assert!(text.ends_with("rover-2-crash.mcap.part  is being written"), "{text}");
+    }
+}
