@@ -74,7 +74,10 @@ fn listed(folder: &Path, graph: &str) -> Vec<ListedRecording> {
     let begin = format!("{graph}-");
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let recordings = entries.filter_map(|entry| {
-        let (name, metadata) = (entry.file_name().into_string().ok()?, entry.metadata().ok()?);
+        let (name, metadata) = (
+            entry.file_name().into_string().ok()?,
+            entry.metadata().ok()?,
+        );
         let is_being_written = name.ends_with(".mcap.part");
         let is_ours = name.starts_with(&begin) && (is_being_written || name.ends_with(".mcap"));
         let written = metadata.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
@@ -135,6 +138,9 @@ mod tests {
         };
         let text = text(&document);
         assert!(text.contains("1.0 MiB  rover-1-alarm.mcap\n"), "{text}");
-        assert!(text.ends_with("rover-2-crash.mcap.part  is being written"), "{text}");
+        assert!(
+            text.ends_with("rover-2-crash.mcap.part  is being written"),
+            "{text}"
+        );
     }
 }

@@ -79,9 +79,8 @@ fn order(view: &View, command: ControlCommand, fault: u32) -> Result<bool, Comma
 
 /// The fault of a name or number; of several of one name, the one that changed last.
 fn find<'a>(document: &'a Document, fault: &str) -> Result<&'a NamedFault, CommandError> {
-    let is_meant = |it: &&NamedFault| {
-        it.name.eq_ignore_ascii_case(fault) || it.number.to_string() == fault
-    };
+    let is_meant =
+        |it: &&NamedFault| it.name.eq_ignore_ascii_case(fault) || it.number.to_string() == fault;
     document.faults.iter().find(is_meant).ok_or_else(|| {
         let names = document.faults.iter();
         let names: Vec<String> = names
