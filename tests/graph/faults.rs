@@ -83,7 +83,8 @@ fn a_fault_lives_from_its_onset_until_it_is_cleared_and_outlives_the_supervisor(
     assert_eq!(document["overall"], "ok");
     assert_eq!(listed(&name).0, 0);
     let (code, _, err) = vigil(&name, &["clear"]);
-    assert_eq!((code, err.trim()), (0, "forgot the faults that were over"));
+    let forgot = format!("graph '{name}': forgot the faults that were over");
+    assert_eq!((code, err.trim()), (0, forgot.as_str()));
     assert_eq!(listed(&name).1["faults"], Value::from(Vec::<Value>::new()));
 
     // Ten blocks a second, also while nothing changes.

@@ -164,17 +164,7 @@ impl OwnGraph {
         }
         let mut teller = Teller::new(&domain.events_file(), !args.json);
         if args.adopt {
-            let clock = WallClock::now();
-            let t_ns = Monotonic.now_ns();
-            teller.tell(&TimelineEntry {
-                t_s: observer.since_ready_s(),
-                t_ns,
-                wall: clock.rfc3339(t_ns),
-                service: "launcher".to_owned(),
-                event: "adopted".to_owned(),
-                what: "the launcher before was gone".to_owned(),
-                ..TimelineEntry::default()
-            });
+            teller.tell(&adoption(&observer));
         }
         let mut watch = Watch {
             args,
@@ -205,6 +195,20 @@ impl OwnGraph {
             write!(out, "{summary}")
         };
         Ok(summary.failed())
+    }
+}
+
+/// That this launcher looks after the graph from now on.
+fn adoption(observer: &HealthObserver) -> TimelineEntry {
+    let t_ns = Monotonic.now_ns();
+    TimelineEntry {
+        t_s: observer.since_ready_s(),
+        t_ns,
+        wall: WallClock::now().rfc3339(t_ns),
+        service: "launcher".to_owned(),
+        event: "adopted".to_owned(),
+        what: "the launcher before was gone".to_owned(),
+        ..TimelineEntry::default()
     }
 }
 
