@@ -266,8 +266,3 @@ impl Feeds {
         all.fold(0, u64::saturating_add)
     }
 }
-
-/// True of an alarm.
-pub fn is_alarm(event: &Event) -> bool {
-    event.kind == vigil_blocks::EventKind::Alarm as u32
-}

@@ -5,7 +5,7 @@ use std::fmt;
 use vigil_blocks::{EventKind, FaultState};
 use vigil_cycle::topic::ServiceName;
 
-use crate::feeds::{News, is_alarm};
+use crate::feeds::News;
 
 /// Why a recording is written, in the order of what names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -27,13 +27,13 @@ impl Reason {
     pub fn find(news: &News) -> Option<(Self, ServiceName)> {
         match news {
             News::Replaced(service) | News::Silent(service) => Some((Self::Crash, *service)),
-            News::Event(service, event) if is_alarm(event) => Some((Self::Alarm, *service)),
             News::Event(service, event) => {
                 let reason = match EventKind::from_repr(event.kind)? {
                     EventKind::Fault => {
                         let state = FaultState::from_repr(event.value as u32 & 0xff);
                         (state == Some(FaultState::Active)).then_some(Self::Alarm)
                     }
+                    EventKind::Alarm => Some(Self::Alarm),
                     EventKind::SafeStop => Some(Self::SafeStop),
                     EventKind::Miss => Some(Self::Miss),
                     _ => None,

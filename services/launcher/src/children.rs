@@ -54,11 +54,11 @@ impl Children {
             }
             // Those already started stop when `children` is dropped.
             let process = Process::start(plan.command(name, &report))?;
-            children.add(plan, domain, (name, process));
+            children.add(plan, name, process);
         }
         let list = domain.processes_file();
         children
-            .announce(plan, domain)
+            .announce(plan)
             .map_err(|cause| LauncherError::file(list, cause))?;
         // It finds a graph that is announced.
         children.blackbox = Some(Companion::start(plan, domain, None));
@@ -86,7 +86,7 @@ impl Children {
                     Process::start(plan.command_again(name, &report, drive.as_ref()))?
                 }
             };
-            children.add(plan, domain, (name, process));
+            children.add(plan, name, process);
         }
         let found = listed.blackbox.and_then(|pid| domain.find_process(pid));
         children.blackbox = Some(Companion::start(plan, domain, found));
@@ -107,21 +107,22 @@ impl Children {
         }
     }
 
-    fn add(&mut self, plan: &Plan, domain: &Domain, (name, process): (ServiceName, Process)) {
+    fn add(&mut self, plan: &Plan, name: ServiceName, process: Process) {
         self.services.push(ServiceProcess {
             name,
             process,
-            report: report_file(domain, name),
-            failure: domain.failure_file(name),
+            report: report_file(&self.domain, name),
+            failure: self.domain.failure_file(name),
             history: RestartHistory::new(plan.restart_policy()),
             restart_at: None,
         });
     }
 
     /// Leaves what the graph runs on, and its processes, where whoever finds it running reads them.
-    fn announce(&mut self, plan: &Plan, domain: &Domain) -> io::Result<()> {
+    fn announce(&mut self, plan: &Plan) -> io::Result<()> {
         self.list()?;
-        std::fs::write(domain.document_file(), plan.document_text())?;
+        let domain = &self.domain;
+        std::fs::write(domain.document_file(), plan.document_text()?)?;
         // First: a publisher that finds the graph may ask for them.
         plan.setup.border().tell_publishers(domain)?;
         let line = |s: &ServiceProcess| format!("{} {}\n", s.name.as_str(), s.process.id());

@@ -1,5 +1,6 @@
 //! What is to be started: options, configuration and every model, checked before anything starts.
 
+use std::io;
 use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -53,7 +54,6 @@ pub struct Plan {
     pub setup: Setup,
     /// What every service reads: the same bytes at each restart, even if a file was edited.
     document: SealedText,
-    text: String,
     /// Folder of the services' programs: the launcher's own.
     pub programs: PathBuf,
     inject: Vec<String>,
@@ -108,7 +108,6 @@ impl Plan {
         let text = document.to_text()?;
         Ok(Self {
             document: SealedText::new(&text).map_err(LauncherError::Document)?,
-            text,
             setup,
             programs: std::env::current_exe()
                 .unwrap_or_default()
@@ -120,8 +119,8 @@ impl Plan {
     }
 
     /// What every service reads.
-    pub fn document_text(&self) -> &str {
-        &self.text
+    pub fn document_text(&self) -> io::Result<String> {
+        std::fs::read_to_string(self.document.path())
     }
 
     /// Lets each service check what it needs, models included, without starting it.

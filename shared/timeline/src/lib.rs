@@ -16,4 +16,6 @@ pub use timeline::Timeline;
 pub use told::{PendingMisses, told};
 pub use wall_clock::{WallClock, time_of_day, unix_time_of_day};
 pub use weighing::{NamedSecond, NamedState, NamedWeighing};
-pub use words::{degraded as degraded_text, watchdog as watchdog_text};
+pub use words::{
+    degraded as degraded_text, service_state as service_state_text, watchdog as watchdog_text,
+};

@@ -1,6 +1,8 @@
 //! Words of the timeline: symptoms, outcomes, degraded services, blindness, watchdog.
 
-use vigil_blocks::{ActionOutcome, Blindness, Degraded, Event, RecoveryKind, Symptoms};
+use vigil_blocks::{
+    ActionOutcome, Blindness, Degraded, Event, RecoveryKind, ServiceState, Symptoms,
+};
 use vigil_cycle::watchdog::WatchdogFinding;
 
 /// Symptoms, joined by `_` as in the decision model; `none` for the empty set. `own` are those that
@@ -53,6 +55,21 @@ pub fn degraded(bits: u32) -> String {
         "no longer".into()
     } else {
         present.join(", ")
+    }
+}
+
+/// The life of a service in a word.
+pub const fn service_state(state: u32) -> &'static str {
+    const STARTING: u32 = ServiceState::Starting as u32;
+    const READY: u32 = ServiceState::Ready as u32;
+    const RUNNING: u32 = ServiceState::Running as u32;
+    const STOPPING: u32 = ServiceState::Stopping as u32;
+    match state {
+        STARTING => "starting",
+        READY => "ready",
+        RUNNING => "running",
+        STOPPING => "stopping",
+        _ => "?",
     }
 }
 

@@ -1,10 +1,7 @@
 //! Commands of the laboratory: another program, `vigil-lab`, beside this one, so that a graph can
 //! be started without building it.
 
-use std::convert::Infallible;
 use std::ffi::OsString;
-use std::os::unix::process::CommandExt;
-use std::process::Command;
 
 use vigil_terminal::{CommandError, Outcome};
 
@@ -48,19 +45,7 @@ pub fn run(words: &[OsString]) -> Result<Outcome, CommandError> {
         let message = format!("'{command}' is no command; `vigil --help` lists them");
         return Err(CommandError::usage(message));
     }
-    match replace(words) {
-        Ok(never) => match never {},
-        Err(error) => Err(error),
-    }
-}
-
-fn replace(words: &[OsString]) -> Result<Infallible, CommandError> {
-    let program = beside::program(PROGRAM)?;
-    let error = Command::new(&program).args(words).exec();
-    Err(CommandError::failure(format!(
-        "{}: {error}",
-        program.display()
-    )))
+    match beside::become_program(PROGRAM, words.iter().cloned())? {}
 }
 
 #[cfg(test)]

@@ -91,10 +91,7 @@ fn listed(name: &str) -> Option<ListedGraph> {
         let name = service.as_str();
         ListedService { name, pid, lives }
     });
-    let since = std::fs::metadata(domain.processes_file()).and_then(|file| file.modified());
-    let up = since
-        .ok()
-        .map(|since| SystemTime::now().duration_since(since));
+    let up = start_time(&domain).map(|start| SystemTime::now().duration_since(start));
     let setup = RunningGraph::read(name).ok().map(|graph| graph.setup);
     Some(ListedGraph {
         name: name.to_owned(),
@@ -106,6 +103,12 @@ fn listed(name: &str) -> Option<ListedGraph> {
         config: setup.as_ref().map(|setup| setup.path.display().to_string()),
         rate_hz: setup.map(|setup| setup.file.graph.rate_hz),
     })
+}
+
+/// When a running graph was started.
+pub fn start_time(domain: &Domain) -> Option<SystemTime> {
+    let list = std::fs::metadata(domain.processes_file());
+    list.and_then(|list| list.modified()).ok()
 }
 
 fn text(graphs: &[ListedGraph]) -> String {

@@ -4,6 +4,7 @@ mod beside;
 mod bindings;
 mod check;
 mod check_publisher;
+mod clipped;
 mod command;
 mod config;
 mod events;

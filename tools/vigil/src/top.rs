@@ -2,7 +2,6 @@
 
 mod belief;
 mod chart;
-mod clipped;
 mod events;
 mod faults;
 mod frame;

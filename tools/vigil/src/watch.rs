@@ -20,6 +20,7 @@ pub use end_to_end::Percentiles;
 pub use history::History;
 pub use view::{Histories, View};
 
+use crate::list::start_time;
 use event_log::EventLog;
 use topics::Topics;
 
@@ -58,7 +59,7 @@ impl Watch {
         let mut watch = Self {
             topics: Some(topics),
             events: EventLog::open(&running.domain.events_file()),
-            start: start(&running),
+            start: start_time(&running.domain),
             looked: Instant::now(),
             view: View {
                 faults: KeptBlock::<Faults>::read_file(&running.domain.faults_file()),
@@ -102,7 +103,7 @@ impl Watch {
 
     /// Sees whether the graph runs, and who belongs to it; joins it again once it was started anew.
     fn look_at_processes(&mut self) {
-        let is_other = start(&self.running) != self.start;
+        let is_other = start_time(&self.running.domain) != self.start;
         let lives = self.running.lives();
         if lives && (is_other || self.topics.is_none()) {
             self.join_again();
@@ -137,9 +138,4 @@ impl Watch {
             *self = joined;
         }
     }
-}
-
-fn start(running: &RunningGraph) -> Option<SystemTime> {
-    let list = std::fs::metadata(running.domain.processes_file());
-    list.and_then(|list| list.modified()).ok()
 }

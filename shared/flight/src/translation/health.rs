@@ -1,9 +1,9 @@
 //! What services say about themselves.
 
-use vigil_blocks::{Degraded, Health, ServiceState};
+use vigil_blocks::{Degraded, Health};
 use vigil_cycle::topic::ServiceName;
 use vigil_setup::Setup;
-use vigil_timeline::degraded_text;
+use vigil_timeline::{degraded_text, service_state_text};
 
 use crate::container::Container;
 use crate::error::FlightError;
@@ -19,18 +19,6 @@ const REPEAT_NS: u64 = 500_000_000;
 pub(crate) struct HealthTranslation {
     robot: String,
     paces: [Pace; ServiceName::ALL.len()],
-}
-
-/// The life of a service in a word.
-fn state_word(state: u32) -> &'static str {
-    let words = [
-        (ServiceState::Starting, "starting"),
-        (ServiceState::Ready, "ready"),
-        (ServiceState::Running, "running"),
-        (ServiceState::Stopping, "stopping"),
-    ];
-    let found = words.iter().find(|(known, _)| *known as u32 == state);
-    found.map_or("?", |(_, word)| word)
 }
 
 /// Numbers of a service; times in µs.
@@ -64,7 +52,7 @@ fn status(service: ServiceName, health: &Health) -> Status {
         bits if bits & (Degraded::INPUT_LOST | Degraded::QUARANTINE) != 0 => Level::Error,
         _ => Level::Warn,
     };
-    let state = state_word(health.state);
+    let state = service_state_text(health.state);
     Status {
         level,
         name: service.as_str().to_owned(),

@@ -2,9 +2,10 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use vigil_blocks::{Degraded, Health, ServiceState};
+use vigil_blocks::{Degraded, Health};
 use vigil_cycle::Placement;
 use vigil_cycle::topic::ServiceName;
+use vigil_timeline::service_state_text;
 
 use crate::watch::View;
 
@@ -77,7 +78,7 @@ impl Service {
             (_, None) => "silent",
             (_, Some((_, health))) if health.age_s > SILENT_S => "silent",
             _ if degraded != 0 => "degraded",
-            (_, Some((state, _))) => state_word(*state),
+            (_, Some((state, _))) => service_state_text(*state),
         };
         Self {
             name: name.as_str(),
@@ -113,20 +114,6 @@ impl ServiceHealth {
             pinned: health.pinned != 0,
             scheduling: Placement::scheduling(health.policy, health.priority),
         }
-    }
-}
-
-const fn state_word(state: u32) -> &'static str {
-    const STARTING: u32 = ServiceState::Starting as u32;
-    const READY: u32 = ServiceState::Ready as u32;
-    const RUNNING: u32 = ServiceState::Running as u32;
-    const STOPPING: u32 = ServiceState::Stopping as u32;
-    match state {
-        STARTING => "starting",
-        READY => "ready",
-        RUNNING => "running",
-        STOPPING => "stopping",
-        _ => "?",
     }
 }
 

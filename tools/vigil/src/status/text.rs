@@ -2,6 +2,7 @@
 
 use super::document::Document;
 use super::service::Service;
+use crate::clipped::clipped;
 use crate::faults::document::NamedFault;
 use crate::faults::table::{ago, why};
 use crate::list::duration_text;
@@ -54,7 +55,7 @@ pub fn text(document: &Document) -> String {
     let from = document.events.len().saturating_sub(EVENTS);
     let events = document.events[from..].iter();
     lines.extend(events.map(|entry| format!("{entry}")));
-    let lines = lines.iter().map(|line| shortened(line));
+    let lines = lines.iter().map(|line| clipped(line, COLUMNS));
     lines.collect::<Vec<_>>().join("\n")
 }
 
@@ -141,13 +142,6 @@ pub fn percent_text(times: &Percentiles) -> String {
         "schedule to action p50 {p50:.0}  p90 {p90:.0}  p99 {p99:.0}  max {max:.0} us  \
          ({window_s:.1} s{ended})"
     )
-}
-
-fn shortened(line: &str) -> String {
-    match line.char_indices().nth(COLUMNS) {
-        None => line.to_owned(),
-        Some(_) => line.chars().take(COLUMNS - 1).chain(['…']).collect(),
-    }
 }
 
 #[cfg(test)]

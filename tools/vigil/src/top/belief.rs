@@ -4,9 +4,9 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use super::chart::{bar, curve};
-use super::clipped::clipped;
 use super::palette::Palette;
 use super::scene::Scene;
+use crate::clipped::clipped;
 use crate::status::{Decision, Diagnosis};
 use crate::watch::History;
 

@@ -4,9 +4,9 @@ use ratatui::style::Style;
 use ratatui::text::Line;
 use vigil_timeline::TimelineEntry;
 
-use super::clipped::clipped;
 use super::palette::Palette;
 use super::scene::Scene;
+use crate::clipped::clipped;
 
 /// A title and the newest events, the newest last, in at most so many lines.
 pub fn lines(scene: &Scene<'_>, rows: usize, width: usize) -> Vec<Line<'static>> {

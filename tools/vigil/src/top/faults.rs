@@ -3,8 +3,8 @@
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
-use super::clipped::clipped;
 use super::palette::Palette;
+use crate::clipped::clipped;
 use crate::faults::document::NamedFault;
 use crate::faults::table::{ago, why};
 use crate::status::Document;

@@ -3,8 +3,8 @@
 use ratatui::text::{Line, Span};
 use vigil_timeline::time_of_day;
 
-use super::clipped::clipped;
 use super::palette::Palette;
+use crate::clipped::clipped;
 use crate::list::duration_text;
 use crate::status::{Document, GraphState};
 

@@ -3,9 +3,9 @@
 use ratatui::text::{Line, Span};
 
 use super::chart::curve;
-use super::clipped::clipped;
 use super::palette::Palette;
 use super::scene::Scene;
+use crate::clipped::clipped;
 use crate::status::{Document, Service, percent_text};
 
 /// Columns before the curve.
