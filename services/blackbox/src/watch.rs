@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
-use vigil_cycle::{Clock, Graph, Monotonic, placement, signal};
+use vigil_cycle::{Clock, Domain, Graph, Monotonic, placement, signal};
 use vigil_setup::{RunningGraph, Setup};
 
 use crate::feeds::{Feeds, News};
@@ -25,8 +25,6 @@ const POLL_MAX: Duration = Duration::from_millis(50);
 const NS: f64 = 1e9;
 /// A recording is at most so many times as long after its first cause as after its last.
 const AFTER_MAX: u64 = 6;
-/// Of a request that the launcher makes when a service is given up.
-const CRASH: &str = "crash: ";
 
 /// Keeps and writes until it is asked to stop, or no service is left.
 pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
@@ -172,7 +170,7 @@ impl Blackbox {
         if fs::rename(&request, &taken).is_ok() {
             let text = fs::read_to_string(&taken).unwrap_or_default();
             let _ = fs::remove_file(&taken);
-            match text.strip_prefix(CRASH) {
+            match text.strip_prefix(Domain::CRASH_REQUEST) {
                 Some(crash) => self.note(Reason::Crash, crash.to_owned()),
                 None => self.note(Reason::Request, text),
             }

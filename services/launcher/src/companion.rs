@@ -124,7 +124,8 @@ pub fn rescue(plan: &Plan, domain: &Domain) {
 /// Asks the black box to record that a service was given up.
 pub fn record_crash(domain: &Domain, gave_up: &str) {
     // What cannot be asked for is not recorded; the summary says what happened.
-    let _ = std::fs::write(domain.request_file(), format!("crash: {gave_up}"));
+    let text = format!("{}{gave_up}", Domain::CRASH_REQUEST);
+    let _ = std::fs::write(domain.request_file(), text);
 }
 
 impl Drop for Companion {

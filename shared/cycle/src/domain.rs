@@ -148,6 +148,9 @@ impl Domain {
         self.folder.join("ring")
     }
 
+    /// What a request to the black box begins with that is about a crash.
+    pub const CRASH_REQUEST: &str = "crash: ";
+
     /// File by which the black box is asked for a recording; it says why, and the box removes it.
     #[must_use]
     pub fn request_file(&self) -> PathBuf {
