@@ -20,24 +20,6 @@ const SILENCE_NS: u64 = 2_000_000_000;
 /// Time without a frame after which missed cycles are the publisher's, ns.
 const FRAMELESS_NS: u64 = 200_000_000;
 
-/// The topics, in the order of their codes in the ring.
-pub const TOPICS: [Topic; 14] = [
-    Topic::Sensor,
-    Topic::Detection,
-    Topic::DetectionParticles,
-    Topic::Diagnosis,
-    Topic::DiagnosisParticles,
-    Topic::Faults,
-    Topic::Action,
-    Topic::Truth,
-    Topic::Health(ServiceName::SensorSim),
-    Topic::Health(ServiceName::Detector),
-    Topic::Health(ServiceName::Identifier),
-    Topic::Health(ServiceName::Supervisor),
-    Topic::Control(ServiceName::SensorSim),
-    Topic::Control(ServiceName::Supervisor),
-];
-
 /// What a look has brought that may be the reason of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum News {
@@ -70,7 +52,7 @@ struct Feed<T: Block> {
 
 impl<T: TopicBlock> Feed<T> {
     fn open(graph: &Graph, topic: Topic, apart_ns: u64) -> Result<Self, PortError> {
-        let code = TOPICS.iter().position(|of| *of == topic);
+        let code = Topic::ALL.iter().position(|of| *of == topic);
         Ok(Self {
             code: code.unwrap_or_default() as u16,
             receiver: graph.receiver(topic)?,

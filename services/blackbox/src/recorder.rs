@@ -8,12 +8,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use vigil_cycle::{Clock, Monotonic};
+use vigil_cycle::{Clock, Monotonic, Topic};
 use vigil_flight::{FlightError, FlightWriter};
 use vigil_setup::RunningGraph;
 use vigil_timeline::{EventReader, WallClock};
 
-use crate::feeds::TOPICS;
 use crate::folder::{self, RecordingsFolder};
 use crate::reason::Reason;
 use crate::ring::{Record, RingReader};
@@ -247,6 +246,10 @@ impl Filling<'_> {
         let document = material.document.as_bytes();
         self.file
             .attach("document.toml", "application/toml", document)?;
+        // A file that is cut short says why it was written, too; the whole reason comes at the end.
+        let cause = &self.order.cause;
+        let about = material.about(cause, std::slice::from_ref(cause), clock);
+        self.file.metadata("vigil", &about)?;
         let lost_before = material.lost.load(Ordering::Relaxed);
         self.blocks()?;
         self.events(&material.running.domain.events_file())?;
@@ -273,7 +276,7 @@ impl Filling<'_> {
             let until_ns = self.orders.causes().until_ns;
             match next {
                 Some(record) if record.t_ns <= until_ns => {
-                    let topic = TOPICS.get(usize::from(record.code));
+                    let topic = Topic::ALL.get(usize::from(record.code));
                     if let (Some(topic), true) = (topic, record.t_ns >= self.order.from_ns) {
                         self.file.block(*topic, &record.bytes)?;
                     }

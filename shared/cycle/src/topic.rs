@@ -71,20 +71,44 @@ impl ServiceName {
 }
 
 impl Topic {
+    /// Every topic on which something is published.
+    pub const ALL: [Self; 14] = [
+        Self::Sensor,
+        Self::Detection,
+        Self::DetectionParticles,
+        Self::Diagnosis,
+        Self::DiagnosisParticles,
+        Self::Faults,
+        Self::Action,
+        Self::Truth,
+        Self::Health(ServiceName::SensorSim),
+        Self::Health(ServiceName::Detector),
+        Self::Health(ServiceName::Identifier),
+        Self::Health(ServiceName::Supervisor),
+        Self::Control(ServiceName::SensorSim),
+        Self::Control(ServiceName::Supervisor),
+    ];
+
+    /// Name within its graph.
+    #[must_use]
+    pub fn name(self) -> String {
+        match self {
+            Self::Sensor => "sensor".to_owned(),
+            Self::Detection => "detection".to_owned(),
+            Self::DetectionParticles => "detection/particles".to_owned(),
+            Self::Diagnosis => "diagnosis".to_owned(),
+            Self::DiagnosisParticles => "diagnosis/particles".to_owned(),
+            Self::Faults => "faults".to_owned(),
+            Self::Action => "action".to_owned(),
+            Self::Truth => "truth".to_owned(),
+            Self::Health(service) => format!("health/{}", service.as_str()),
+            Self::Control(service) => format!("control/{}", service.as_str()),
+        }
+    }
+
     /// Full name of the topic in `graph`.
     #[must_use]
     pub fn path(self, graph: &str) -> String {
-        match self {
-            Self::Sensor => format!("vigil/{graph}/sensor"),
-            Self::Detection => format!("vigil/{graph}/detection"),
-            Self::DetectionParticles => format!("vigil/{graph}/detection/particles"),
-            Self::Diagnosis => format!("vigil/{graph}/diagnosis"),
-            Self::DiagnosisParticles => format!("vigil/{graph}/diagnosis/particles"),
-            Self::Faults => format!("vigil/{graph}/faults"),
-            Self::Action => format!("vigil/{graph}/action"),
-            Self::Truth => format!("vigil/{graph}/truth"),
-            Self::Health(service) => format!("vigil/{graph}/health/{}", service.as_str()),
-            Self::Control(service) => format!("vigil/{graph}/control/{}", service.as_str()),
-        }
+        format!("vigil/{graph}/{}", self.name())
     }
 }

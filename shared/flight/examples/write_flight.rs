@@ -4,7 +4,6 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::fs;
 use std::path::PathBuf;
 
 use vigil_blocks::{
@@ -16,7 +15,7 @@ use vigil_blocks::{
 use vigil_cycle::topic::{ServiceName, Topic};
 use vigil_flight::{FlightError, FlightWriter};
 use vigil_robot::channel::{Role, channels, hash};
-use vigil_setup::{Setup, load_graph};
+use vigil_setup::{Document, Setup};
 use vigil_timeline::{Timeline, WallClock};
 
 const PERIOD_NS: u64 = 50_000_000;
@@ -269,13 +268,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = PathBuf::from(arguments.next().unwrap_or_else(|| "flight.mcap".to_owned()));
     let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/rover.toml");
     let graph_path = arguments.next().unwrap_or_else(|| shipped.to_owned());
-    let graph = load_graph(graph_path.as_ref(), |_| {})?;
+    let document = Document::read(graph_path.as_ref(), |_| {})?;
+    let graph = document.check()?;
     let node = graph.tree.leaves().next().ok_or("a tree without leaves")?;
 
     let mut flight = FlightWriter::create(&path, &graph, WallClock::ahead_by(AHEAD_NS))?;
     let why = BTreeMap::from([("reason".to_owned(), "an example".to_owned())]);
     flight.metadata("vigil", &why)?;
-    flight.attach("graph.toml", "application/toml", &fs::read(&graph_path)?)?;
+    let document = document.to_text()?;
+    flight.attach("document.toml", "application/toml", document.as_bytes())?;
     for cycle in 0..CYCLES {
         Instant::new(cycle).write(&mut flight, &graph, node)?;
     }

@@ -20,6 +20,13 @@ const CHUNK_NS: u64 = 1_000_000_000;
 /// Size from which a chunk is closed, bytes.
 const CHUNK_BYTES: usize = 1 << 20;
 
+/// What channels of blocks and events as they were begin with.
+pub(crate) const RAW: &str = "/vigil/raw/";
+/// What channels of blocks of another version begin with.
+pub(crate) const FOREIGN: &str = "/vigil/foreign/";
+/// The program that writes, up to its version.
+pub(crate) const LIBRARY: &str = "vigil ";
+
 /// What the messages of a channel are.
 pub(crate) struct ChannelForm {
     /// How they are encoded.
@@ -78,7 +85,7 @@ impl Container {
         let options = WriteOptions::new()
             .compression(None)
             .profile("ros2")
-            .library(concat!("vigil ", env!("CARGO_PKG_VERSION")))
+            .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
             .chunk_size(None)
             .disable_seeking(true);
         let writer =

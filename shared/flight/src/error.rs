@@ -1,10 +1,10 @@
-//! Why a flight cannot be written.
+//! Why a flight cannot be written or read.
 
 use std::path::PathBuf;
 
 use thiserror::Error;
 
-/// Why a flight cannot be written. What was flushed before stays in the partial file.
+/// Why a flight cannot be written or read. What was flushed before stays in the partial file.
 #[derive(Debug, Error)]
 pub enum FlightError {
     /// The file cannot be created, synchronised or renamed.
@@ -22,5 +22,41 @@ pub enum FlightError {
         path: PathBuf,
         /// What the container says.
         source: mcap::McapError,
+    },
+    /// The file cannot be opened or read.
+    #[error("cannot read {}: {source}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file does not begin as MCAP files do.
+    #[error("{} is no MCAP file", path.display())]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Another program's file.
+    #[error("{} is an MCAP file, but no recording of Vigil", path.display())]
+    NotOfVigil {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Another program has compressed the file.
+    #[error("{} is compressed ({how}): `mcap decompress` writes it anew", path.display())]
+    Compressed {
+        /// The file.
+        path: PathBuf,
+        /// The name of the compression.
+        how: String,
+    },
+    /// What stands in the file is not what was written.
+    #[error("{} is damaged: {what}", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Where it contradicts itself.
+        what: String,
     },
 }

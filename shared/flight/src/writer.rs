@@ -5,12 +5,13 @@ use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use vigil_blocks::layout::Layout;
-use vigil_blocks::{Block, Control, Header, ParticleBlock};
+use vigil_blocks::{Block, Control, ParticleBlock};
 use vigil_cycle::topic::Topic;
 use vigil_setup::Setup;
 use vigil_timeline::{TimelineEntry, WallClock};
 
-use crate::container::{ChannelForm, Container};
+use crate::block_bytes::{block_header, read_block};
+use crate::container::{ChannelForm, Container, FOREIGN, RAW};
 use crate::error::FlightError;
 use crate::message_times::MessageTimes;
 use crate::summary::FlightSummary;
@@ -24,7 +25,6 @@ pub struct FlightWriter {
     file: Container,
     translation: Translation,
     clock: WallClock,
-    graph: String,
     raw_only: u64,
 }
 
@@ -53,13 +53,6 @@ const fn block_form(type_name: &'static str, notes: BTreeMap<String, String>) ->
     }
 }
 
-/// The header of a block of this type; `None` if the bytes are something else.
-fn header<B: Block>(bytes: &[u8]) -> Option<Header> {
-    let head = bytes.get(..size_of::<Header>())?;
-    let header: Header = bytemuck::pod_read_unaligned(head);
-    (header.schema == B::SCHEMA && bytes.len() == size_of::<B>()).then_some(header)
-}
-
 impl FlightWriter {
     /// Begins a file of `graph`, whose models give everything its name. `clock` says what the
     /// calendar said while the graph ran.
@@ -71,7 +64,6 @@ impl FlightWriter {
             file: Container::create(path)?,
             translation: Translation::new(graph),
             clock,
-            graph: graph.file.graph.name.clone(),
             raw_only: 0,
         })
     }
@@ -135,10 +127,9 @@ impl FlightWriter {
         bytes: &[u8],
     ) -> Result<Option<ReadBlock<B>>, FlightError> {
         let times = self.keep::<B>(topic, bytes)?;
-        Ok(times.map(|times| ReadBlock {
-            block: bytemuck::pod_read_unaligned(bytes),
-            times,
-        }))
+        Ok(times
+            .zip(read_block(bytes))
+            .map(|(times, block)| ReadBlock { block, times }))
     }
 
     /// Keeps a block as it is, and says when it was; `None` if it is something else.
@@ -147,19 +138,17 @@ impl FlightWriter {
         topic: Topic,
         bytes: &[u8],
     ) -> Result<Option<MessageTimes>, FlightError> {
-        let path = topic.path(&self.graph);
-        let prefix = format!("vigil/{}/", self.graph);
-        let name = path.strip_prefix(&prefix).unwrap_or(&path);
-        let Some(header) = header::<B>(bytes) else {
+        let name = topic.name();
+        let Some(header) = block_header::<B>(bytes) else {
             // Nothing says when it was, so it is put after what came before it.
             let times = MessageTimes::at(self.file.last_ns().unwrap_or_else(unix_now_ns));
-            let topic = format!("/vigil/foreign/{name}");
+            let topic = format!("{FOREIGN}{name}");
             let form = || block_form("", BTreeMap::new());
             self.file.write_bytes(&topic, times, bytes, form)?;
             return Ok(None);
         };
         let times = MessageTimes::new(&header, &self.clock);
-        let topic = format!("/vigil/raw/{name}");
+        let topic = format!("{RAW}{name}");
         let layout = || BTreeMap::from([("layout".to_owned(), layout_text::<B>())]);
         let form = || block_form(B::TYPE_NAME, layout());
         self.file.write_bytes(&topic, times, bytes, form)?;
