@@ -77,6 +77,7 @@ const SERVICES: &[&str] = &[
 const TOOLS: &[&str] = &[
     "vigil-terminal",
     "vigil-pages",
+    "vigil-flight-page",
     "vigil-learning",
     "vigil-evaluation",
     "vigil-import",

@@ -110,6 +110,18 @@ impl Document {
     pub fn read_text(path: &Path) -> Result<Self, SetupError> {
         Ok(TextFile::read(path.to_path_buf()).parse()?)
     }
+
+    /// The same of a text that stands in another file, which errors name.
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    pub fn from_text(path: &Path, text: String) -> Result<Self, SetupError> {
+        let file = TextFile {
+            path: path.to_path_buf(),
+            text: Ok(text),
+        };
+        Ok(file.parse()?)
+    }
 }
 
 /// The path that the graph file at `graph` means by `name`.

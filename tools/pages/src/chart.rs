@@ -1,14 +1,10 @@
 //! Curves as SVG inside a page: colours are the page's, so that they follow light and dark.
 
-use super::svg::{Anchor, Drawing, Pen};
-
-/// Colours of lines in the page (`--c1` ..).
-pub const COLOURS: usize = 6;
-/// Colour of the text, for lines that are no data.
-pub const INK: usize = 0;
+use super::svg::{Anchor, Dash, Drawing, Pen};
+use crate::colour::Colour;
 
 /// One axis.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Axis {
     /// What it shows, with its unit.
     pub title: &'static str,
@@ -31,22 +27,37 @@ impl Axis {
 
     /// From 0 to `end`, labelled in steps of 1, 2 or 5 times a power of ten, about `count` of them.
     pub fn linear(title: &'static str, end: f64, count: f64) -> Self {
-        let end = if end.is_finite() && end > 0.0 {
-            end
-        } else {
-            1.0
-        };
-        let rough = end / count;
+        let is_some = end.is_finite() && end > 0.0;
+        Self::between(title, [0.0, if is_some { end } else { 1.0 }], count)
+    }
+
+    /// The same between two ends.
+    pub fn between(title: &'static str, range: [f64; 2], count: f64) -> Self {
+        let [from, to] = range;
+        let extent = to - from;
+        if !(extent.is_finite() && extent > 0.0) {
+            return Self::linear(title, 1.0, count);
+        }
+        let rough = extent / count;
         let power = 10.0_f64.powf(rough.log10().floor());
         let steps = [1.0, 2.0, 5.0, 10.0].map(|m| m * power);
-        let step = steps.into_iter().find(|step| *step >= rough).unwrap_or(end);
+        let step = steps
+            .into_iter()
+            .find(|step| *step >= rough)
+            .unwrap_or(extent);
         let decimals = (-step.log10().floor()).max(0.0) as usize;
-        let n = (end / step + 1e-9).floor() as usize;
-        let tick = |i: usize| (i as f64 * step, format!("{:.decimals$}", i as f64 * step));
+        let first = (from / step - 1e-9).ceil();
+        let n = (to / step + 1e-9).floor() - first;
+        let tick = |i: usize| {
+            // No minus before a zero.
+            let value = (first + i as f64) * step + 0.0;
+            (value, format!("{value:.decimals$}"))
+        };
+        let ticks = (0..=n.max(0.0) as usize).map(tick).collect();
         Self {
             title,
-            range: [0.0, end],
-            ticks: (0..=n).map(tick).collect(),
+            range,
+            ticks,
         }
     }
 
@@ -61,13 +72,14 @@ impl Axis {
         }
     }
 
-    /// Where a value lies between the ends, 0 to 1.
-    fn share_of(&self, value: f64) -> f64 {
+    /// Where a value lies between the ends, 0 to 1; what lies beyond is at an end.
+    pub(crate) fn share_of(&self, value: f64) -> f64 {
         let [from, to] = self.range;
-        if to > from {
-            (value - from) / (to - from)
-        } else {
+        let share = (value - from) / (to - from);
+        if share.is_nan() {
             0.0
+        } else {
+            share.clamp(0.0, 1.0)
         }
     }
 }
@@ -81,23 +93,36 @@ pub enum Stroke {
     Thin,
     /// A broken line.
     Dashed,
+    /// A line of dots.
+    Dotted,
     /// A filled circle at each point.
     Dots,
+    /// The area within, through which the rest shows.
+    Area,
 }
 
 /// One curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Colour: [`INK`] or 1 to [`COLOURS`].
-    pub colour: usize,
+    /// Its colour.
+    pub colour: Colour,
     /// How it is drawn.
     pub stroke: Stroke,
     /// Its points in the axes' units.
     pub points: Vec<(f64, f64)>,
 }
 
-/// A chart.
+/// Words in a chart.
 #[derive(Debug, Clone, PartialEq)]
+pub struct Label {
+    /// Where they begin, in the axes' units.
+    pub at: (f64, f64),
+    /// The words.
+    pub text: String,
+}
+
+/// A chart.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Chart {
     /// Said to those who cannot see it.
     pub caption: String,
@@ -109,10 +134,12 @@ pub struct Chart {
     pub y: Axis,
     /// The curves; later ones lie above.
     pub curves: Vec<Curve>,
+    /// Words above all curves.
+    pub labels: Vec<Label>,
 }
 
 /// Height of a letter.
-const LETTER: i32 = 22;
+pub(crate) const LETTER: i32 = 22;
 const GRID: &str = "var(--grid)";
 
 /// Where the curves lie in a chart.
@@ -124,16 +151,24 @@ struct Plot<'a> {
     bottom: f64,
 }
 
+/// Left and right end of what is drawn between the axes.
+pub(crate) fn sides(width: u32, has_y_title: bool) -> [f64; 2] {
+    let letter = f64::from(LETTER);
+    let title = if has_y_title { letter } else { 0.0 };
+    [2.5 * letter + 16.0 + title, f64::from(width) - letter]
+}
+
 impl<'a> Plot<'a> {
     /// Between the labels and titles of the axes.
     fn new(chart: &'a Chart) -> Self {
         let letter = f64::from(LETTER);
         let title = |axis: &Axis| if axis.title.is_empty() { 0.0 } else { letter };
         let (width, height) = chart.size;
+        let [left, right] = sides(width, !chart.y.title.is_empty());
         Self {
             chart,
-            left: 2.5 * letter + 16.0 + title(&chart.y),
-            right: f64::from(width) - letter,
+            left,
+            right,
             top: 0.5 * letter,
             bottom: f64::from(height) - 1.5 * letter - 12.0 - title(&chart.x),
         }
@@ -151,7 +186,7 @@ impl<'a> Plot<'a> {
         let pen = |width: f64| Pen {
             colour: GRID,
             width,
-            is_dashed: false,
+            dash: Dash::None,
         };
         let letter = f64::from(LETTER);
         let &Self {
@@ -180,26 +215,51 @@ impl<'a> Plot<'a> {
     }
 
     fn curve(&self, curve: &Curve, drawing: &mut Drawing) {
-        let colour = match curve.colour {
-            INK => "currentColor".to_owned(),
-            colour => format!("var(--c{colour})"),
+        let colour = curve.colour.css();
+        let is_place = |(x, y): &&(f64, f64)| x.is_finite() && y.is_finite();
+        let points = curve.points.iter().filter(is_place);
+        let points = points.map(|(x, y)| (self.x(*x), self.y(*y)));
+        let points: Vec<_> = points.collect();
+        let dash = match curve.stroke {
+            Stroke::Dots => {
+                points
+                    .into_iter()
+                    .for_each(|at| drawing.dot(at, 7.0, &colour));
+                return;
+            }
+            Stroke::Area => return drawing.area(&points, &colour, 0.45),
+            Stroke::Solid | Stroke::Thin => Dash::None,
+            Stroke::Dashed => Dash::Strokes,
+            Stroke::Dotted => Dash::Dots,
         };
-        let points = curve.points.iter().map(|(x, y)| (self.x(*x), self.y(*y)));
-        if curve.stroke == Stroke::Dots {
-            points.for_each(|at| drawing.dot(at, 7.0, &colour));
-            return;
-        }
-        let is_thin = curve.colour == INK || curve.stroke == Stroke::Thin;
+        let is_thin = curve.colour == Colour::Ink || curve.stroke == Stroke::Thin;
         let pen = Pen {
             colour: &colour,
             width: if is_thin { 2.0 } else { 4.0 },
-            is_dashed: curve.stroke == Stroke::Dashed,
+            dash,
         };
-        drawing.line(&points.collect::<Vec<_>>(), pen);
+        drawing.line(&points, pen);
     }
 }
 
 impl Chart {
+    /// Makes both axes equally long for equal values: the shorter range grows on both sides.
+    #[must_use]
+    pub fn with_equal_scales(mut self) -> Self {
+        let plot = Plot::new(&self);
+        let lengths = [plot.right - plot.left, plot.bottom - plot.top];
+        let ranges = [self.x.range, self.y.range];
+        let extents = ranges.map(|[from, to]| to - from);
+        let scale = (extents[0] / lengths[0]).max(extents[1] / lengths[1]);
+        let widened = |[from, to]: [f64; 2], length: f64| {
+            let (middle, half) = (0.5 * (from + to), 0.5 * scale * length);
+            [middle - half, middle + half]
+        };
+        self.x = Axis::between(self.x.title, widened(ranges[0], lengths[0]), 8.0);
+        self.y = Axis::between(self.y.title, widened(ranges[1], lengths[1]), 6.0);
+        self
+    }
+
     /// The chart as an SVG element for a page that defines `--c1` .. and `--grid`.
     #[must_use]
     pub fn svg(&self) -> String {
@@ -209,6 +269,68 @@ impl Chart {
         for curve in &self.curves {
             plot.curve(curve, &mut drawing);
         }
+        for label in &self.labels {
+            let at = (plot.x(label.at.0) + 12.0, plot.y(label.at.1) - 4.0);
+            drawing.text(&label.text, at, LETTER, Anchor::Start);
+        }
         drawing.element(self.size.0, self.size.1, &self.caption)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ticks(axis: &Axis) -> Vec<&str> {
+        axis.ticks.iter().map(|(_, text)| text.as_str()).collect()
+    }
+
+    #[test]
+    fn labels_stand_at_round_values_within_the_ends() {
+        assert_eq!(
+            ticks(&Axis::linear("", 1.0, 5.0)),
+            ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
+        );
+        assert_eq!(
+            ticks(&Axis::between("", [-12.0, 7.0], 4.0)),
+            ["-10", "-5", "0", "5"]
+        );
+        assert_eq!(
+            ticks(&Axis::between("", [f64::NAN, 7.0], 2.0)),
+            ["0.0", "0.5", "1.0"]
+        );
+        assert_eq!(Axis::linear("", f64::NAN, 2.0).range, [0.0, 1.0]);
+    }
+
+    #[test]
+    fn equal_scales_keep_all_that_was_within() {
+        let chart = Chart {
+            size: (900, 700),
+            x: Axis::between("x, m", [0.0, 1.0], 5.0),
+            y: Axis::between("y, m", [-4.0, 4.0], 5.0),
+            ..Chart::default()
+        };
+        let chart = chart.with_equal_scales();
+        let plot = Plot::new(&chart);
+        let scale = |range: [f64; 2], length: f64| (range[1] - range[0]) / length;
+        let x = scale(chart.x.range, plot.right - plot.left);
+        let y = scale(chart.y.range, plot.bottom - plot.top);
+        assert!((x - y).abs() < 1e-9);
+        assert!((chart.y.range[1] - 4.0).abs() < 1e-9 && chart.x.range[0] < 0.0);
+    }
+
+    #[test]
+    fn what_is_no_number_is_not_drawn() {
+        let chart = Chart {
+            size: (300, 200),
+            curves: vec![Curve {
+                colour: Colour::Healthy,
+                stroke: Stroke::Solid,
+                points: vec![(0.0, f64::NAN), (f64::INFINITY, 1.0), (0.5, 9.0)],
+            }],
+            ..Chart::default()
+        };
+        let svg = chart.svg();
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     }
 }

@@ -25,8 +25,19 @@ pub struct Pen<'a> {
     pub colour: &'a str,
     /// Its width.
     pub width: f64,
-    /// True for a broken line.
-    pub is_dashed: bool,
+    /// Whether it is broken.
+    pub dash: Dash,
+}
+
+/// Whether a line is broken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dash {
+    /// It is whole.
+    None,
+    /// In strokes.
+    Strokes,
+    /// In dots.
+    Dots,
 }
 
 /// Shapes, later ones above.
@@ -56,10 +67,10 @@ impl Drawing {
     /// A line through points.
     pub fn line(&mut self, points: &[Point], pen: Pen<'_>) {
         let (points, Pen { colour, width, .. }) = (listed(points), pen);
-        let dashes = if pen.is_dashed {
-            " stroke-dasharray=\"10 8\""
-        } else {
-            ""
+        let dashes = match pen.dash {
+            Dash::None => "",
+            Dash::Strokes => " stroke-dasharray=\"10 8\"",
+            Dash::Dots => " stroke-dasharray=\"2 6\"",
         };
         self.push(format_args!(
             "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" \

@@ -16,7 +16,7 @@ const COMMANDS: [(&str, &str); 7] = [
     ("learn", "Learns a model from recorded frames, or shows one"),
     ("diagnose", "Diagnoses recorded runs"),
     ("evaluate", "Scores the diagnosis on labelled runs"),
-    ("report", "Writes a page about recorded runs"),
+    ("report", "Writes a page about a recording or runs"),
     (
         "pomdp",
         "Checks, solves, compares and learns decision models",

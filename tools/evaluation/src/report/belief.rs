@@ -2,8 +2,9 @@
 
 use super::{Report, words};
 use crate::scoring::{Case, Taxonomy, UNKNOWN, Verdict};
-use vigil_pages::chart::{Axis, Chart, Curve, INK, Stroke};
-use vigil_pages::page::{beside, escaped, key, section as page_section};
+use vigil_pages::chart::{Axis, Chart, Curve, Stroke};
+use vigil_pages::colour::Colour;
+use vigil_pages::page::{KeyEntry, Section, beside, escaped, key};
 
 /// Modes drawn of a run.
 const MODES: usize = 5;
@@ -29,13 +30,32 @@ impl Explanation {
             Self::Unknown => verdict.p_unknown,
         }
     }
+
+    const fn colour(self) -> Colour {
+        match self {
+            Self::Node(i) => Colour::node(i),
+            Self::Unknown => Colour::Unknown,
+        }
+    }
 }
 
-/// A mode to draw: the true one, nominal driving and unknown have colours of their own.
+/// A mode to draw.
 struct Mode<'a> {
     of: Explanation,
     name: &'a str,
-    colour: usize,
+    is_true: bool,
+}
+
+impl Mode<'_> {
+    fn key(&self) -> KeyEntry {
+        let mark = if self.is_true { " (true)" } else { "" };
+        let colour = self.of.colour();
+        KeyEntry {
+            colour,
+            stroke: colour.stroke(),
+            name: format!("{}{mark}", self.name),
+        }
+    }
 }
 
 /// The true mode first, then the others that reached most.
@@ -57,17 +77,12 @@ fn leading<'a>(case: &Case, taxonomy: &'a Taxonomy) -> Vec<Mode<'a>> {
         .collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.truncate(MODES);
-    let mut free = [3, 4, 6].into_iter();
-    let coloured = found.into_iter().map(|(highest, of, name)| {
-        let colour = match of {
-            _ if highest.is_infinite() => 1,
-            Explanation::Node(0) => 2,
-            Explanation::Unknown => 5,
-            Explanation::Node(_) => free.next().unwrap_or(INK),
-        };
-        Mode { of, name, colour }
+    let modes = found.into_iter().map(|(highest, of, name)| Mode {
+        of,
+        name,
+        is_true: highest.is_infinite(),
     });
-    coloured.collect()
+    modes.collect()
 }
 
 /// Points of a curve without those that change nothing to the eye.
@@ -94,15 +109,15 @@ fn chart(case: &Case, taxonomy: &Taxonomy, set: &str) -> String {
     let mut curves = Vec::new();
     if let Some(onset_s) = case.label.onset_s {
         curves.push(Curve {
-            colour: INK,
+            colour: Colour::Ink,
             stroke: Stroke::Dashed,
             points: vec![(onset_s, 0.0), (onset_s, 1.0)],
         });
     }
     // The true mode lies on top.
     curves.extend(modes.iter().rev().map(|mode| Curve {
-        colour: mode.colour,
-        stroke: Stroke::Solid,
+        colour: mode.of.colour(),
+        stroke: mode.of.colour().stroke(),
         points: thinned(case, mode.of),
     }));
     let chart = Chart {
@@ -114,8 +129,9 @@ fn chart(case: &Case, taxonomy: &Taxonomy, set: &str) -> String {
             ..Axis::share("")
         },
         curves,
+        ..Chart::default()
     };
-    let names: Vec<_> = modes.iter().map(|m| (m.colour, m.name, false)).collect();
+    let names: Vec<_> = modes.iter().map(Mode::key).collect();
     format!("{}{}\n", key(&names), chart.svg())
 }
 
@@ -168,7 +184,7 @@ fn changes(case: &Case) -> String {
 }
 
 /// Runs without labels: what was believed in each, and what changed.
-pub fn unlabelled(cases: &[Case], set: &str, taxonomy: &Taxonomy) -> String {
+pub fn unlabelled(cases: &[Case], set: &str, taxonomy: &Taxonomy) -> Section {
     let run = |case: &Case| {
         let (id, changes) = (case.label.run, changes(case));
         let chart = chart(case, taxonomy, set);
@@ -186,7 +202,12 @@ pub fn unlabelled(cases: &[Case], set: &str, taxonomy: &Taxonomy) -> String {
     let about = "Probability of the leading modes over time, s; before an alarm, of nominal \
                  driving and unknown. Below it, each change of the alarm, the reported name and \
                  the action.";
-    page_section("belief", "Runs", about, &inside)
+    Section {
+        id: "belief",
+        heading: "Runs",
+        about: about.to_owned(),
+        inside,
+    }
 }
 
 /// True if anything was wrong about the run: a false alarm, a fault missed, a wrong leaf after 2 s.
@@ -216,7 +237,7 @@ fn not_drawn(runs: &[String]) -> String {
 }
 
 /// All runs, the wrong ones first.
-pub fn section(report: &Report<'_>) -> String {
+pub fn section(report: &Report<'_>) -> Section {
     let count = report.sets.first().map_or(0, |set| set.cases.len());
     let (wrong, right): (Vec<usize>, Vec<usize>) = (0..count).partition(|i| is_wrong(report, *i));
     let (mut inside, mut left_out) = (String::new(), Vec::new());
@@ -240,5 +261,10 @@ pub fn section(report: &Report<'_>) -> String {
                  driving and unknown. The first name is the true one; the broken line is the \
                  onset. First the runs with a false alarm, a missed fault or a wrong leaf 2 s \
                  after the onset, with any of the channels.";
-    page_section("belief", "Belief over time", about, &inside)
+    Section {
+        id: "belief",
+        heading: "Belief over time",
+        about: about.to_owned(),
+        inside,
+    }
 }

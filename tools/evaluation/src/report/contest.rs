@@ -4,7 +4,7 @@ use super::summary::{number, ratio, types};
 use super::{Report, SensorSet, words};
 use crate::scoring::bounds::Difference;
 use crate::scoring::{Row, Share};
-use vigil_pages::page::{escaped, section as page_section};
+use vigil_pages::page::{Section, escaped};
 
 fn apart(difference: Option<&Difference>, scale: f64, decimals: usize) -> String {
     let Some(found) = difference else {
@@ -62,8 +62,8 @@ fn table(rows: &[Row], caption: &str) -> String {
     )
 }
 
-/// The filters of all sets; empty if none were compared.
-pub fn section(report: &Report<'_>) -> String {
+/// The filters of all sets; none if none were compared.
+pub fn section(report: &Report<'_>) -> Option<Section> {
     let part = |set: &SensorSet<'_>| {
         let contest = set.contest?;
         let tables = types(report).into_iter().filter_map(|class| {
@@ -74,11 +74,15 @@ pub fn section(report: &Report<'_>) -> String {
     };
     let parts: Vec<String> = report.sets.iter().filter_map(part).collect();
     if parts.is_empty() {
-        return String::new();
+        return None;
     }
     let about = "The same runs, the same detector. Below each figure: its difference from the \
                  first row, run by run, with a 95 % interval (shares in points, after Agresti and \
                  Min; log scores after Student).";
-    let parts: String = parts.concat();
-    page_section("filters", "Filters beside each other", about, &parts)
+    Some(Section {
+        id: "filters",
+        heading: "Filters beside each other",
+        about: about.to_owned(),
+        inside: parts.concat(),
+    })
 }

@@ -3,8 +3,9 @@
 use super::summary::{number, types};
 use super::{Report, SensorSet, words};
 use crate::scoring::{Bin, ClassDetection, Point, Score};
-use vigil_pages::chart::{Axis, COLOURS, Chart, Curve, INK, Stroke};
-use vigil_pages::page::{beside, escaped, key, section};
+use vigil_pages::chart::{Axis, Chart, Curve, Stroke};
+use vigil_pages::colour::Colour;
+use vigil_pages::page::{KeyEntry, Section, beside, escaped, key};
 
 const SIZE: (u32, u32) = (900, 560);
 /// Values at which an axis of delays is labelled, s.
@@ -22,11 +23,11 @@ fn pair(report: &Report<'_>, draw: impl Fn(&SensorSet<'_>) -> String) -> String 
 }
 
 /// Colour of the type of fault at this place.
-fn colour(i: usize) -> usize {
-    i % COLOURS + 1
+const fn colour(i: usize) -> Colour {
+    Colour::Series(i)
 }
 
-fn curve(colour: usize, stroke: Stroke, points: Vec<(f64, f64)>) -> Curve {
+fn curve(colour: Colour, stroke: Stroke, points: Vec<(f64, f64)>) -> Curve {
     Curve {
         colour,
         stroke,
@@ -35,12 +36,16 @@ fn curve(colour: usize, stroke: Stroke, points: Vec<(f64, f64)>) -> Curve {
 }
 
 /// Reliability: how often claims of like probability were true.
-pub fn calibration(report: &Report<'_>) -> String {
+pub fn calibration(report: &Report<'_>) -> Section {
     let names = types(report);
     // All of them are the sum of what is drawn.
     let drawn = |class: &str| class != "all" || names.len() == 1;
     let charts = pair(report, |set| {
-        let mut curves = vec![curve(INK, Stroke::Dashed, vec![(0.0, 0.0), (1.0, 1.0)])];
+        let mut curves = vec![curve(
+            Colour::Ink,
+            Stroke::Dashed,
+            vec![(0.0, 0.0), (1.0, 1.0)],
+        )];
         let mut tables = String::new();
         for (i, class) in names.iter().enumerate().filter(|(_, class)| drawn(class)) {
             let found = set.score.calibration.get(class);
@@ -61,6 +66,7 @@ pub fn calibration(report: &Report<'_>) -> String {
             x: Axis::share("probability of the name"),
             y: Axis::share("share true"),
             curves,
+            ..Chart::default()
         };
         let tables = format!("<details><summary>as tables</summary>\n{tables}</details>\n");
         format!("{}{tables}", chart.svg())
@@ -69,9 +75,14 @@ pub fn calibration(report: &Report<'_>) -> String {
                  equal width, against the share that was true, with 95 % bounds. An abstract \
                  node above the true leaf is true. Below the broken line names are less often true \
                  than they claim, above it more often.";
-    let legend = legend(&names, drawn, &[("", false)]);
+    let legend = legend(&names, drawn, &[("", Stroke::Solid)]);
     let inside = format!("{legend}{charts}");
-    section("calibration", "Calibration", about, &inside)
+    Section {
+        id: "calibration",
+        heading: "Calibration",
+        about: about.to_owned(),
+        inside,
+    }
 }
 
 fn reliability(class: &str, bins: &[Bin]) -> String {
@@ -96,7 +107,7 @@ fn reliability(class: &str, bins: &[Bin]) -> String {
 }
 
 /// Share of faults found within a time.
-pub fn delays(report: &Report<'_>) -> String {
+pub fn delays(report: &Report<'_>) -> Section {
     let names = types(report);
     let charts = pair(report, |set| {
         let curves = names.iter().enumerate().filter_map(|(i, class)| {
@@ -117,29 +128,33 @@ pub fn delays(report: &Report<'_>) -> String {
             x: Axis::placed("delay, s", &DELAYS_S, place_delay),
             y: Axis::share("share of faults found"),
             curves: curves.collect(),
+            ..Chart::default()
         };
         chart.svg()
     });
     let about = "From the onset of the fault to the alarm, at the configured threshold.";
-    let inside = format!("{}{charts}", legend(&names, |_| true, &[("", false)]));
-    section("delay", "Time to the alarm", about, &inside)
+    let inside = format!(
+        "{}{charts}",
+        legend(&names, |_| true, &[("", Stroke::Solid)])
+    );
+    Section {
+        id: "delay",
+        heading: "Time to the alarm",
+        about: about.to_owned(),
+        inside,
+    }
 }
 
-fn legend(names: &[String], drawn: impl Fn(&str) -> bool, strokes: &[(&str, bool)]) -> String {
+fn legend(names: &[String], drawn: impl Fn(&str) -> bool, strokes: &[(&str, Stroke)]) -> String {
     let names = names.iter().enumerate().filter(|(_, name)| drawn(name));
     let all = names.flat_map(|(i, name)| {
-        let name = move |&(stroke, dashed): &(&str, bool)| {
-            let text = format!("{name} {stroke}");
-            (colour(i), text.trim_end().to_owned(), dashed)
-        };
-        strokes.iter().map(name)
+        strokes.iter().map(move |(words, stroke)| KeyEntry {
+            colour: colour(i),
+            stroke: *stroke,
+            name: format!("{name} {words}").trim_end().to_owned(),
+        })
     });
-    let all: Vec<_> = all.collect();
-    let all: Vec<_> = all
-        .iter()
-        .map(|(c, name, d)| (*c, name.as_str(), *d))
-        .collect();
-    key(&all)
+    key(&all.collect::<Vec<_>>())
 }
 
 /// Place of a delay on its axis: logarithmic, what lies outside at its ends.
@@ -176,7 +191,7 @@ fn over_thresholds(
 }
 
 /// Delay and misses against false alarms.
-pub fn trade_off(report: &Report<'_>) -> String {
+pub fn trade_off(report: &Report<'_>) -> Section {
     let names = types(report);
     let charts = pair(report, |set| {
         let score = set.score;
@@ -199,6 +214,7 @@ pub fn trade_off(report: &Report<'_>) -> String {
             x: rate_axis(score),
             y: Axis::placed("delay, s", &DELAYS_S, place_delay),
             curves: delay,
+            ..Chart::default()
         };
         let missed = Chart {
             caption: format!("Missed against false alarms, {}", words(set.name)),
@@ -206,6 +222,7 @@ pub fn trade_off(report: &Report<'_>) -> String {
             x: rate_axis(score),
             y: Axis::share("share missed"),
             curves: missed,
+            ..Chart::default()
         };
         format!(
             "{}{}{}",
@@ -220,9 +237,18 @@ pub fn trade_off(report: &Report<'_>) -> String {
                  those of the faults found. To the left \
                  of the dots they may come out too long: once its own alarm stands, the detector \
                  follows the robot and gathers less evidence.";
-    let legend = legend(&names, |_| true, &[("median", false), ("mean", true)]);
+    let legend = legend(
+        &names,
+        |_| true,
+        &[("median", Stroke::Solid), ("mean", Stroke::Dashed)],
+    );
     let inside = format!("{legend}{charts}");
-    section("trade-off", "Delay against false alarms", about, &inside)
+    Section {
+        id: "trade-off",
+        heading: "Delay against false alarms",
+        about: about.to_owned(),
+        inside,
+    }
 }
 
 fn configured(score: &Score, names: &[String]) -> String {

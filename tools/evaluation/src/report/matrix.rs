@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{Report, words};
 use crate::scoring::{MULTIPLE, Matrix, Taxonomy, UNKNOWN};
-use vigil_pages::page::{beside, escaped, section as page_section};
+use vigil_pages::page::{Section, beside, escaped};
 
 /// Words that occur in a matrix, leaves first, in the tree's order.
 fn order(words: &BTreeSet<&str>, taxonomy: &Taxonomy) -> Vec<String> {
@@ -64,7 +64,7 @@ fn table(matrix: &Matrix, taxonomy: &Taxonomy, caption: &str) -> String {
 }
 
 /// The matrices of all sets.
-pub fn section(report: &Report<'_>) -> String {
+pub fn section(report: &Report<'_>) -> Section {
     let part = |set: &super::SensorSet<'_>| {
         let score = set.score;
         let head = format!("<h3>{}</h3>\n", escaped(words(set.name)));
@@ -81,5 +81,10 @@ pub fn section(report: &Report<'_>) -> String {
     let parts: Vec<String> = report.sets.iter().map(part).collect();
     let about = "Runs; rows: what was true, columns: what was reported 2 s after the onset (in \
                  nominal runs: at the end).";
-    page_section("confusion", "Confusion", about, &beside(&parts))
+    Section {
+        id: "confusion",
+        heading: "Confusion",
+        about: about.to_owned(),
+        inside: beside(&parts),
+    }
 }

@@ -8,8 +8,10 @@ mod contest;
 mod curves;
 mod matrix;
 mod summary;
+mod verdict;
 
 use crate::scoring::{Case, Contest, Score, Taxonomy};
+use vigil_pages::page::page;
 
 /// What was found with one set of channels.
 #[derive(Debug, Clone, Copy)]
@@ -44,17 +46,17 @@ impl Report<'_> {
     /// The page.
     #[must_use]
     pub fn html(&self) -> String {
-        let mut body = summary::section(self);
-        body.push_str(&contest::section(self));
-        body.push_str(&matrix::section(self));
+        let mut sections = vec![summary::section(self)];
+        sections.extend(contest::section(self));
+        sections.push(matrix::section(self));
         if self.identifies() {
-            body.push_str(&curves::calibration(self));
+            sections.push(curves::calibration(self));
         }
-        body.push_str(&curves::delays(self));
-        body.push_str(&curves::trade_off(self));
-        body.push_str(&belief::section(self));
-        body.push_str(&summary::facts(&self.facts));
-        vigil_pages::page::page("Vigil: evaluation", &body)
+        sections.push(curves::delays(self));
+        sections.push(curves::trade_off(self));
+        sections.push(belief::section(self));
+        sections.push(summary::facts(&self.facts));
+        page("Vigil: evaluation", &verdict::verdict(self), &sections)
     }
 }
 
@@ -67,12 +69,14 @@ pub fn unlabelled(
     set: &str,
     taxonomy: &Taxonomy,
 ) -> String {
-    let body = format!(
-        "<header><h1>Vigil: diagnosis</h1></header>\n{}{}",
+    let alarmed = |case: &&Case| case.verdicts.iter().any(|verdict| verdict.alarm);
+    let alarmed = cases.iter().filter(alarmed).count();
+    let said = format!("An alarm rose in {alarmed} of {} runs.", cases.len());
+    let sections = [
         belief::unlabelled(cases, set, taxonomy),
-        summary::facts(facts)
-    );
-    vigil_pages::page::page("Vigil: diagnosis", &body)
+        summary::facts(facts),
+    ];
+    page("Vigil: diagnosis", &said, &sections)
 }
 
 /// Name of a set of channels in words.

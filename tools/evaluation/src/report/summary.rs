@@ -2,7 +2,7 @@
 
 use super::{Report, SensorSet, words};
 use crate::scoring::{Calibration, Detection, Identification, Instants, Ratio, Score, Spread};
-use vigil_pages::page::escaped;
+use vigil_pages::page::{Section, escaped};
 
 /// A ratio with its bounds, as every table of the page writes it.
 pub fn ratio(ratio: Ratio) -> String {
@@ -199,8 +199,8 @@ fn table(report: &Report<'_>, body: &str) -> String {
     )
 }
 
-/// The head of the page and its figures.
-pub fn section(report: &Report<'_>) -> String {
+/// The figures.
+pub fn section(report: &Report<'_>) -> Section {
     let mut body = alarm_rows(report);
     for class in types(report) {
         body.push_str(&group(report, &class));
@@ -233,14 +233,16 @@ pub fn section(report: &Report<'_>) -> String {
          Garwood, over the time in which an alarm was possible). Times count from the onset of \
          the fault; runs that end earlier do not count. {names}"
     );
-    format!(
-        "<header><h1>Vigil: evaluation</h1></header>\n{}",
-        vigil_pages::page::section("summary", "Figures", &about, &inside)
-    )
+    Section {
+        id: "summary",
+        heading: "Figures",
+        about,
+        inside,
+    }
 }
 
 /// What was evaluated and how.
-pub fn facts(facts: &[(&str, String)]) -> String {
+pub fn facts(facts: &[(&str, String)]) -> Section {
     let row = |(name, value): &(&str, String)| {
         format!(
             "<tr><th>{name}</th><td><code>{}</code></td></tr>\n",
@@ -249,6 +251,10 @@ pub fn facts(facts: &[(&str, String)]) -> String {
     };
     let rows: String = facts.iter().map(row).collect();
     let inside = format!("<div class=\"wide\"><table>\n<tbody>\n{rows}</tbody>\n</table></div>\n");
-    let about = "Enough to repeat it.";
-    vigil_pages::page::section("provenance", "What was evaluated, and how", about, &inside)
+    Section {
+        id: "provenance",
+        heading: "What was evaluated, and how",
+        about: "Enough to repeat it.".to_owned(),
+        inside,
+    }
 }

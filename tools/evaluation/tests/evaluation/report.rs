@@ -97,6 +97,12 @@ fn the_page_is_well_formed_and_loads_nothing() {
         "provenance",
     ];
     assert_eq!(sections, wanted);
+    let links = page.descendants().filter_map(|node| node.attribute("href"));
+    let links: Vec<String> = links.map(str::to_owned).collect();
+    assert_eq!(links, wanted.map(|id| format!("#{id}")));
+    let verdict = page.descendants().find(|node| node.attribute("class") == Some("verdict"));
+    let verdict = verdict.and_then(|node| node.text()).unwrap();
+    assert!(verdict.contains("3 of 3 (100.0 %) faults were found"), "{verdict}");
     for outside in [
         "http://", "https://", "src=", "<script", "<link", "@import", "url(",
     ] {

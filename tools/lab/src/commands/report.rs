@@ -1,7 +1,8 @@
-//! `vigil report`: recorded runs as one page to read, without labels.
+//! `vigil report`: a recording, or recorded runs without labels, as one page to read.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use clap::{ArgMatches, Command, Error, FromArgMatches};
 use vigil_evaluation::report;
 use vigil_evaluation::scoring::Case;
 use vigil_recording::labels::Label;
@@ -11,15 +12,56 @@ use super::offline::FilterArgs;
 use vigil_terminal::output::Progress;
 use vigil_terminal::{CommandError, Outcome};
 
-/// Diagnoses recorded frames without labels and writes one page: what was believed in each run over
-/// time, and each change of alarm, name and action.
+/// Writes one page (HTML) about a recording of the black box, or about recorded frames.
+///
+/// Of a recording (MCAP), it says what was wrong, and shows beliefs, faults, actions, path,
+/// latencies and health over time. What was believed then is shown as it was.
+///
+/// Of frames (CSV; --model and --frames), it diagnoses each run anew. It shows what was believed,
+/// and each change of alarm, name and action. All options but --out are about frames.
 #[derive(Debug, clap::Args)]
 pub struct Args {
+    /// A recording of the black box, such as `vigil recordings` lists; one that is cut short is
+    /// shown as far as it goes.
+    #[arg(
+        value_name = "RECORDING",
+        conflicts_with_all = ["FilterArgs", "IntervalArgs", "RobotArgs"]
+    )]
+    recording: Option<PathBuf>,
     #[command(flatten)]
-    filter: FilterArgs,
+    frames: FramesArgs,
     /// Where to write the page (HTML).
-    #[arg(long, value_name = "OUT")]
+    #[arg(short, long, value_name = "OUT")]
     out: PathBuf,
+}
+
+/// Frames to diagnose, unless there is a recording.
+#[derive(Debug)]
+struct FramesArgs(Option<FilterArgs>);
+
+impl FromArgMatches for FramesArgs {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
+        let is_there = matches.contains_id("frames");
+        let filter = is_there.then(|| FilterArgs::from_arg_matches(matches));
+        filter.transpose().map(Self)
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl clap::Args for FramesArgs {
+    fn augment_args(command: Command) -> Command {
+        let command = <FilterArgs as clap::Args>::augment_args(command);
+        let command = command.mut_arg("model", |arg| arg.required(false).requires("frames"));
+        command.mut_arg("frames", |arg| arg.required(false).requires("model"))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        <Self as clap::Args>::augment_args(command)
+    }
 }
 
 /// Writes the page.
@@ -28,9 +70,25 @@ pub struct Args {
 /// An input that is refused; an output that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     check_place("--out", &args.out)?;
-    let models = args.filter.prepare()?;
-    let (set, filter) = (&args.filter.sensors, args.filter.identifier);
-    let initial = args.filter.initial(&models, set, filter)?;
+    let page = match (&args.recording, &args.frames.0) {
+        (Some(recording), _) => of_recording(recording)?,
+        (None, Some(filter)) => of_frames(filter)?,
+        (None, None) => {
+            let wanted = "give a RECORDING (MCAP), or frames with --model and --frames";
+            return Err(CommandError::usage(wanted));
+        }
+    };
+    write_whole(&args.out, &page)?;
+    Ok(Outcome::Done)
+}
+
+fn of_recording(path: &Path) -> Result<String, CommandError> {
+    vigil_flight_page::page(path).map_err(CommandError::usage)
+}
+
+fn of_frames(filter: &FilterArgs) -> Result<String, CommandError> {
+    let models = filter.prepare()?;
+    let initial = filter.initial(&models, &filter.sensors, filter.identifier)?;
     let progress = Progress::new("runs", models.runs.len());
     let mut cases = Vec::new();
     for run in &models.runs {
@@ -40,10 +98,13 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             verdicts: initial.verdicts(run)?,
         });
     }
-    let facts = args.filter.facts(&models);
-    let page = report::unlabelled(&facts, &cases, set, &models.taxonomy);
-    write_whole(&args.out, &page)?;
-    Ok(Outcome::Done)
+    let facts = filter.facts(&models);
+    Ok(report::unlabelled(
+        &facts,
+        &cases,
+        &filter.sensors,
+        &models.taxonomy,
+    ))
 }
 
 /// Of a run of which nothing is known.

@@ -276,3 +276,41 @@ fn unlabelled_runs_have_a_page_too() {
         .filter(|row| row.get(1).is_some_and(|alarm| alarm == "alarm"));
     assert!(stuck.into_iter().any(|row| row[2].ends_with("_STUCK")));
 }
+
+/// What is asked for is a recording or frames; what does not fit is named.
+#[test]
+fn a_page_is_of_a_recording_or_of_frames() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("run.html").display().to_string();
+    let no_recording = folder.path().join("a.mcap");
+    fs::write(&no_recording, "t_s,x_m\n").unwrap();
+    let no_recording = no_recording.display().to_string();
+    for (words, wanted) in [
+        (
+            &[][..],
+            "give a RECORDING (MCAP), or frames with --model and --frames",
+        ),
+        (&[&no_recording], "a.mcap is no MCAP file"),
+        (&["missing.mcap"], "cannot read missing.mcap"),
+        (
+            &["a.mcap", "--seed", "3"],
+            "cannot be used with '--seed <S>'",
+        ),
+        (
+            &["a.mcap", "--model", MODEL, "--frames", "f.csv"],
+            "cannot be used with",
+        ),
+        (&["--frames", "f.csv"], "--model <MODEL>"),
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_vigil-lab"))
+            .arg("report")
+            .args(words)
+            .args(["-o", &out])
+            .output()
+            .unwrap();
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{words:?}: {message}");
+        assert!(message.contains(wanted), "{words:?}: {message}");
+    }
+    assert!(!Path::new(&out).exists());
+}

@@ -2,7 +2,8 @@
 
 use vigil_pomdp::{Evidence, Pomdp, Tracker};
 
-use super::canvas::{AXIS, INK, colour, legend};
+use super::canvas::{AXIS, INK, legend};
+use vigil_pages::colour::middle as colour;
 use vigil_pages::svg::{Anchor, Drawing};
 
 const LEFT: f64 = 60.0;

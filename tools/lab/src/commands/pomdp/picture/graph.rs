@@ -8,7 +8,8 @@ use layout::gv::{DotParser, GraphBuilder};
 use vigil_pomdp::Pomdp;
 use vigil_pomdp::policy_graph::{Edge, Node, PolicyGraph};
 
-use super::canvas::{INK, colour};
+use super::canvas::INK;
+use vigil_pages::colour::middle as colour;
 
 /// States below this are not named in a node.
 const STATE_MIN: f64 = 0.05;

@@ -3,7 +3,8 @@
 use vigil_pomdp::Pomdp;
 use vigil_pomdp::policy::Decider;
 
-use super::canvas::{AXIS, INK, colour, legend};
+use super::canvas::{AXIS, INK, legend};
+use vigil_pages::colour::middle as colour;
 use vigil_pages::svg::{Anchor, Drawing, Pen, Point};
 
 /// Cells along a line, and along a side of a triangle.

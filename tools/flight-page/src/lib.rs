@@ -1,0 +1,16 @@
+#![doc = include_str!("../README.md")]
+
+mod belief;
+mod error;
+mod events;
+mod gaps;
+mod health;
+mod latency;
+mod lives;
+mod path;
+mod recording;
+mod spans;
+mod verdict;
+
+pub use error::PageError;
+pub use recording::page;

@@ -1,0 +1,232 @@
+//! Alarms, the life of faults, and the action that stands.
+
+use std::collections::BTreeMap;
+
+use vigil_blocks::{
+    Action, DetectionBelief, FaultRecord, FaultSource, FaultState, Faults, MODE_UNKNOWN,
+    OverallState, RecoveryKind,
+};
+use vigil_pages::bands::{Bar, Row};
+use vigil_pages::colour::Colour;
+use vigil_setup::{Setup, fault_name};
+
+use crate::spans::{Span, Spans};
+
+/// The life of one fault.
+#[derive(Debug)]
+pub(crate) struct FaultLife {
+    pub(crate) name: String,
+    pub(crate) colour: Colour,
+    /// Which state it had when.
+    pub(crate) states: Spans<FaultState>,
+    pub(crate) source: u32,
+    pub(crate) what: u32,
+    /// Probability when it was present last.
+    pub(crate) p: f64,
+    /// When it became active first, s; below 0 before the recording.
+    pub(crate) active_since_s: Option<f64>,
+}
+
+/// What was decided and told of faults.
+#[derive(Debug, Default)]
+pub(crate) struct Lives {
+    detector_alarm: Spans<()>,
+    standing_alarm: Spans<()>,
+    faults: BTreeMap<(u32, u32), FaultLife>,
+    action: Spans<(String, bool)>,
+    overall: Option<OverallState>,
+}
+
+/// True while the fault is there.
+pub(crate) const fn is_present(state: FaultState) -> bool {
+    matches!(state, FaultState::Active | FaultState::Acknowledged)
+}
+
+/// Colour of a fault.
+const fn colour(source: u32, what: u32) -> Colour {
+    match FaultSource::from_repr(source) {
+        Some(FaultSource::Robot) if what == MODE_UNKNOWN => Colour::Unknown,
+        Some(FaultSource::Robot) => Colour::node(what as usize),
+        _ => Colour::Soft,
+    }
+}
+
+impl Lives {
+    /// Takes a belief of the detector.
+    pub(crate) fn take_detection(&mut self, t_s: f64, belief: &DetectionBelief) {
+        self.detector_alarm
+            .take(t_s, (belief.alarm == 1).then_some(()));
+    }
+
+    /// Takes an action of the graph's decision model.
+    pub(crate) fn take_action(&mut self, t_s: f64, action: &Action, setup: &Setup) {
+        self.standing_alarm
+            .take(t_s, (action.alarm == 1).then_some(()));
+        let name = setup.decision.actions().get(action.action as usize);
+        let name = name.map_or("?", String::as_str);
+        let name = match action.kind == RecoveryKind::None as u32 {
+            true => "nothing decided: stop".to_owned(),
+            false => setup.robot.action_text(name, action.answered()),
+        };
+        let is_plain = action.kind == RecoveryKind::GoOn as u32;
+        self.action.take(t_s, Some((name, is_plain)));
+    }
+
+    /// Takes the faults.
+    pub(crate) fn take_faults(&mut self, t_s: f64, faults: &Faults, setup: &Setup) {
+        self.overall = OverallState::from_repr(faults.overall);
+        for life in self.faults.values_mut() {
+            let is_kept = |record: &FaultRecord| {
+                (record.source, record.what) == (life.source, life.what)
+                    && record.state() != Some(FaultState::Cleared)
+            };
+            if !faults.kept().any(is_kept) {
+                life.states.take(t_s, None);
+            }
+        }
+        for record in faults.kept() {
+            let Some(state) = record.state().filter(|it| *it != FaultState::Cleared) else {
+                continue;
+            };
+            let (source, what) = (record.source, record.what);
+            let life = self
+                .faults
+                .entry((source, what))
+                .or_insert_with(|| FaultLife {
+                    name: fault_name(&setup.tree, source, what).to_owned(),
+                    colour: colour(source, what),
+                    states: Spans::default(),
+                    source,
+                    what,
+                    p: 0.0,
+                    active_since_s: None,
+                });
+            life.states.take(t_s, Some(state));
+            if record.p.is_finite() {
+                life.p = record.p;
+            }
+            if is_present(state) && life.active_since_s.is_none() {
+                let now_ns = faults.header.t_publish_ns as f64;
+                let age_s = (now_ns - record.changed_ns as f64) * 1e-9;
+                let is_known = record.changed_ns > 0 && state == FaultState::Active;
+                life.active_since_s = Some(t_s - if is_known { age_s.max(0.0) } else { 0.0 });
+            }
+        }
+    }
+
+    /// All faults, those that were present first before others.
+    pub(crate) fn faults(&self) -> Vec<&FaultLife> {
+        let mut all: Vec<&FaultLife> = self.faults.values().collect();
+        let begin = |life: &FaultLife| life.states.all().first().map_or(0.0, |span| span.from_s);
+        all.sort_by(|a, b| begin(a).total_cmp(&begin(b)));
+        all
+    }
+
+    /// From when to when an alarm stood, s: the supervisor's, or else the detector's.
+    pub(crate) fn alarms(&self) -> Vec<[f64; 2]> {
+        let spans = match self.action.all().is_empty() {
+            true => self.detector_alarm.all(),
+            false => self.standing_alarm.all(),
+        };
+        spans.iter().map(|span| [span.from_s, span.to_s]).collect()
+    }
+
+    /// The actions in their order, each with when it began, s.
+    pub(crate) fn actions(&self) -> Vec<(&str, f64)> {
+        let all = self.action.all().iter();
+        all.map(|span| (span.value.0.as_str(), span.from_s))
+            .collect()
+    }
+
+    /// The action at the end.
+    pub(crate) fn last_action(&self) -> Option<&str> {
+        self.action.last().map(|action| action.0.as_str())
+    }
+
+    /// The overall state at the end.
+    pub(crate) const fn overall(&self) -> Option<OverallState> {
+        self.overall
+    }
+
+    /// True if the supervisor told of faults at all.
+    pub(crate) const fn is_told(&self) -> bool {
+        self.overall.is_some()
+    }
+
+    /// A row for each kind of alarm, each fault, and the action.
+    pub(crate) fn rows(&self) -> Vec<Row> {
+        let alarm = |span: &Span<()>| Bar {
+            span: [span.from_s, span.to_s],
+            colour: Colour::Alarm,
+            opacity: 0.5,
+            text: "alarm".to_owned(),
+        };
+        let row = |name: &str, bars: Vec<Bar>| Row {
+            name: name.to_owned(),
+            bars,
+            ticks: Vec::new(),
+        };
+        let bars = |spans: &Spans<()>| spans.all().iter().map(alarm).collect::<Vec<Bar>>();
+        let mut rows = vec![row("alarm of the detector", bars(&self.detector_alarm))];
+        rows.push(row("alarm of the supervisor", bars(&self.standing_alarm)));
+        let faults = self.faults();
+        rows.extend(faults.iter().map(|life| {
+            let bars = life.states.all().iter().map(|span| life.bar(span));
+            row(&format!("fault {}", life.name), bars.collect())
+        }));
+        if faults.is_empty() {
+            rows.push(row("faults: none", Vec::new()));
+        }
+        let action = |span: &Span<(String, bool)>| Bar {
+            span: [span.from_s, span.to_s],
+            colour: if span.value.1 {
+                Colour::Healthy
+            } else {
+                Colour::Ink
+            },
+            opacity: 0.22,
+            text: span.value.0.clone(),
+        };
+        rows.push(row(
+            "action that stands",
+            self.action.all().iter().map(action).collect(),
+        ));
+        rows
+    }
+
+    /// How many spans are not drawn because a value flickered.
+    pub(crate) fn left_out(&self) -> usize {
+        let faults = self.faults.values().map(|life| life.states.left_out);
+        let alarms = self.detector_alarm.left_out + self.standing_alarm.left_out;
+        alarms + self.action.left_out + faults.sum::<usize>()
+    }
+}
+
+impl FaultLife {
+    fn bar(&self, span: &Span<FaultState>) -> Bar {
+        let opacity = match span.value {
+            FaultState::Pending | FaultState::Cleared => 0.12,
+            FaultState::Active => 0.65,
+            FaultState::Acknowledged => 0.45,
+            FaultState::Latched => 0.25,
+        };
+        Bar {
+            span: [span.from_s, span.to_s],
+            colour: self.colour,
+            opacity,
+            text: span.value.name().to_owned(),
+        }
+    }
+
+    /// True if it was present at any time of the recording.
+    pub(crate) const fn was_present(&self) -> bool {
+        self.active_since_s.is_some()
+    }
+
+    /// From when to when it was present, s.
+    pub(crate) fn presence(&self) -> Vec<[f64; 2]> {
+        let spans = self.states.all().iter();
+        let present = spans.filter(|span| is_present(span.value));
+        present.map(|span| [span.from_s, span.to_s]).collect()
+    }
+}
