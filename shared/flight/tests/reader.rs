@@ -28,10 +28,10 @@ fn header<B: Block>(t_ns: u64) -> Header {
 }
 
 /// What a recording holds: topic or `events`, time and bytes, or the event's words.
-type Told = (String, u64, Vec<u8>);
+type Entry = (String, u64, Vec<u8>);
 
 /// Writes a recording with several chunks; what is in it.
-fn write(path: &Path) -> Vec<Told> {
+fn write(path: &Path) -> Vec<Entry> {
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/rover.toml");
     let graph = vigil_setup::load_graph(&config, |_| {}).unwrap();
     let mut writer = FlightWriter::create(path, &graph, WallClock::ahead_by(7)).unwrap();
@@ -78,7 +78,7 @@ fn write(path: &Path) -> Vec<Told> {
     told
 }
 
-fn read(reader: &mut FlightReader) -> Result<Vec<Told>, FlightError> {
+fn read(reader: &mut FlightReader) -> Result<Vec<Entry>, FlightError> {
     let mut told = Vec::new();
     while let Some(recorded) = reader.next()? {
         told.push(match recorded {

@@ -38,19 +38,19 @@ pub(crate) fn time_of_day(rfc3339: &str) -> &str {
 }
 
 fn words(entry: &TimelineEntry) -> String {
-    let mut words = format!("{} {}", entry.event, entry.what);
+    let mut words = format!("{} {}", entry.event, entry.what).trim().to_owned();
     if let Some(set) = &entry.fault_set {
         words.push_str(&format!(" {set}"));
     }
     if let Some(p) = entry.p {
         words.push_str(&format!(", p = {p:.3}"));
     }
-    words.trim().to_owned()
+    words
 }
 
 impl Events {
     /// Takes an event; those that only programs read are left out.
-    pub(crate) fn take(&mut self, t_s: f64, entry: &TimelineEntry) {
+    pub(crate) fn take(&mut self, t_s: f64, rfc3339: &str, entry: &TimelineEntry) {
         if !entry.is_told() {
             return;
         }
@@ -63,7 +63,7 @@ impl Events {
             self.ticks.push((t_s, colour));
         }
         let row = vec![
-            time_of_day(&entry.wall).to_owned(),
+            time_of_day(rfc3339).to_owned(),
             format!("{t_s:.3}"),
             entry.service.clone(),
             words(entry),
@@ -115,13 +115,12 @@ mod tests {
     fn many_events_leave_out_their_middle_and_say_so() {
         let mut events = Events::default();
         let mut entry = TimelineEntry {
-            wall: "2023-11-14T22:13:32.345Z".into(),
             event: "alarm".into(),
             ..TimelineEntry::default()
         };
         for i in 0..1000 {
             entry.what = format!("<{i}>");
-            events.take(f64::from(i), &entry);
+            events.take(f64::from(i), "2023-11-14T22:13:32.345Z", &entry);
         }
         let table = events.table();
         assert!(

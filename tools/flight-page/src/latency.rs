@@ -93,7 +93,13 @@ fn histogram(counts: &Histogram<u64>, deadline_ms: f64) -> String {
     if deadline_ms > 0.0 {
         let place = deadline_ms.log10();
         curves.push(bound([(place, 0.0), (place, highest)]));
-        let at = (place, 0.94 * highest);
+        // Beside the line, on the side that has room.
+        let aside = if place > from + 0.9 * (to - from) {
+            0.08
+        } else {
+            0.0
+        };
+        let at = (place - aside * (to - from), 0.94 * highest);
         labels.push(Label {
             at,
             text: "deadline".to_owned(),
@@ -135,14 +141,14 @@ impl Latencies {
         let deadline_ms = deadline_ns as f64 * MS;
         let at = |quantile: f64| format!("{:.3}", counts.value_at_quantile(quantile) as f64 * MS);
         let late = counts.count_between(deadline_ns.max(1), LATENCY_NS_MAX);
+        let known = |text: String| match deadline_ns {
+            0 => "?".to_owned(),
+            _ => text,
+        };
         let mut row: Vec<String> = [0.5, 0.9, 0.99, 0.999, 1.0].map(at).to_vec();
         row.extend([
-            format!("{deadline_ms:.3}"),
-            if deadline_ns == 0 {
-                "?".to_owned()
-            } else {
-                late.to_string()
-            },
+            known(format!("{deadline_ms:.3}")),
+            known(late.to_string()),
             counts.len().to_string(),
             self.missed.to_string(),
         ]);

@@ -155,39 +155,23 @@ impl Path {
             .collect()
     }
 
-    /// Heads of arrows along the path, each as long as `length_m`.
+    /// Heads of arrows along the path, each as long as `length_m`. They show where the way over
+    /// that length leads, not where the noise of one place does.
     fn arrows(&self, length_m: f64) -> Vec<Curve> {
-        let steps = self.places.windows(2);
-        let driven = |pair: &[Place]| match pair {
-            [a, b] if !b.is_after_break => a.distance(b),
-            _ => 0.0,
-        };
-        let total: f64 = steps.clone().map(driven).sum();
-        let apart = total / ARROWS as f64;
-        if apart < length_m {
-            return Vec::new();
-        }
-        let (mut way, mut next, mut arrows) = (0.0, 0.5 * apart, Vec::new());
-        for pair in steps {
-            way += driven(pair);
-            let [a, b] = pair else { continue };
-            if way < next || driven(pair) <= 0.0 {
-                continue;
+        let mut ways: Vec<[Place; 2]> = Vec::new();
+        let mut begin: Option<Place> = None;
+        for place in &self.places {
+            let before = begin.filter(|_| !place.is_after_break);
+            match before {
+                Some(before) if before.distance(place) < length_m => continue,
+                Some(before) => ways.push([before, *place]),
+                None => {}
             }
-            next += apart;
-            let length = a.distance(b);
-            let (ux, uy) = ((b.x - a.x) / length, (b.y - a.y) / length);
-            let corner = |along: f64, aside: f64| {
-                let [along, aside] = [along * length_m, aside * length_m];
-                (b.x + along * ux - aside * uy, b.y + along * uy + aside * ux)
-            };
-            arrows.push(Curve {
-                colour: Colour::Ink,
-                stroke: Stroke::Area,
-                points: vec![corner(0.6, 0.0), corner(-0.4, 0.4), corner(-0.4, -0.4)],
-            });
+            begin = Some(*place);
         }
-        arrows
+        let apart = ways.len().div_ceil(ARROWS).max(1);
+        let shown = ways.iter().skip(apart / 2).step_by(apart);
+        shown.map(|way| arrow(way, length_m)).collect()
     }
 
     /// The chart, with the stretches on which faults were present and the place of each alarm.
@@ -251,6 +235,22 @@ impl Path {
             labels,
         };
         format!("{}{}\n", key(&entries), chart.with_equal_scales().svg())
+    }
+}
+
+/// An arrowhead at the end of a way.
+fn arrow(way: &[Place; 2], length_m: f64) -> Curve {
+    let [a, b] = way;
+    let length = a.distance(b).max(1e-9);
+    let (ux, uy) = ((b.x - a.x) / length, (b.y - a.y) / length);
+    let corner = |along: f64, aside: f64| {
+        let [along, aside] = [along * length_m, aside * length_m];
+        (b.x + along * ux - aside * uy, b.y + along * uy + aside * ux)
+    };
+    Curve {
+        colour: Colour::Ink,
+        stroke: Stroke::Area,
+        points: vec![corner(0.6, 0.0), corner(-0.4, 0.4), corner(-0.4, -0.4)],
     }
 }
 

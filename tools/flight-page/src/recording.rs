@@ -105,7 +105,8 @@ impl Recording {
                 Ok(None) => break None,
                 Ok(Some(Recorded::Event { log_time_ns, entry })) => {
                     let t_s = self.since_origin(log_time_ns);
-                    self.events.take(t_s, &entry);
+                    let clock = WallClock::ahead_by(i128::from(log_time_ns)).rfc3339(0);
+                    self.events.take(t_s, &clock, &entry);
                 }
                 Ok(Some(Recorded::Block {
                     topic,
@@ -113,7 +114,7 @@ impl Recording {
                     bytes,
                 })) => {
                     let t_s = self.since_origin(log_time_ns);
-                    self.strange += u64::from(self.take(t_s, topic, bytes).is_none());
+                    self.strange += u64::from(self.take(t_s.max(0.0), topic, bytes).is_none());
                 }
                 Err(error @ FlightError::Damaged { .. }) => break Some(error.to_string()),
                 Err(error) => return Err(error),
@@ -129,9 +130,11 @@ impl Recording {
         })
     }
 
+    /// Seconds since the first block or event of the file; events may be from before that.
     fn since_origin(&mut self, log_time_ns: u64) -> f64 {
         let origin_ns = *self.origin_ns.get_or_insert(log_time_ns);
-        let t_s = log_time_ns.saturating_sub(origin_ns) as f64 * 1e-9;
+        let since_ns = i128::from(log_time_ns) - i128::from(origin_ns);
+        let t_s = since_ns as f64 * 1e-9;
         self.end_s = self.end_s.max(t_s);
         t_s
     }
@@ -270,7 +273,9 @@ impl Recording {
             ("the reason came at", about("when")),
             (
                 "all causes",
-                about("causes").filter(|causes| causes.contains('\n')),
+                about("causes")
+                    .filter(|causes| causes.contains('\n'))
+                    .map(|causes| causes.replace('\n', "; ")),
             ),
             (
                 "blocks lost before recording",

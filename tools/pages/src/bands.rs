@@ -5,7 +5,7 @@ use crate::colour::Colour;
 use crate::svg::{Anchor, Dash, Drawing, Pen};
 
 /// Height of a row: its name, and its bars below.
-const ROW: f64 = 62.0;
+const ROW: f64 = 72.0;
 const BAR: f64 = 28.0;
 /// Width of a letter within a bar.
 const LETTER_WIDTH: f64 = 10.5;

@@ -2,6 +2,7 @@
 
 use super::svg::{Anchor, Dash, Drawing, Pen};
 use crate::colour::Colour;
+pub use crate::stroke::Stroke;
 
 /// One axis.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -82,23 +83,6 @@ impl Axis {
             share.clamp(0.0, 1.0)
         }
     }
-}
-
-/// How a curve is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stroke {
-    /// A line.
-    Solid,
-    /// A thin line.
-    Thin,
-    /// A broken line.
-    Dashed,
-    /// A line of dots.
-    Dotted,
-    /// A filled circle at each point.
-    Dots,
-    /// The area within, through which the rest shows.
-    Area,
 }
 
 /// One curve.
@@ -227,7 +211,7 @@ impl<'a> Plot<'a> {
                     .for_each(|at| drawing.dot(at, 7.0, &colour));
                 return;
             }
-            Stroke::Area => return drawing.area(&points, &colour, 0.45),
+            Stroke::Area => return drawing.area(&points, &colour, 0.35),
             Stroke::Solid | Stroke::Thin => Dash::None,
             Stroke::Dashed => Dash::Strokes,
             Stroke::Dotted => Dash::Dots,

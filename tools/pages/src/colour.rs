@@ -3,7 +3,7 @@
 //! No hue stands alone for a meaning: faults have names beside them, and beyond eight broken lines.
 //! Healthy is green, and no fault is: those who see no red from green tell it by its darkness.
 
-use crate::chart::Stroke;
+use crate::stroke::Stroke;
 
 /// A colour in light pages, in dark ones, and in pictures that know neither.
 struct Tone {

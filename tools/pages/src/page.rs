@@ -1,7 +1,8 @@
 //! The page around the sections: one file, no script, nothing loaded.
 
-use crate::chart::Stroke;
 use crate::colour::{Colour, variables};
+pub use crate::markup::escaped;
+use crate::stroke::Stroke;
 
 /// Style of the page; colours for light and dark, to which those of faults come.
 const STYLE: &str = "\
@@ -115,23 +116,6 @@ pub fn table(heads: &[&str], rows: &[Vec<String>]) -> String {
         ),
     };
     format!("<div class=\"wide\"><table>\n{heads}<tbody>\n{rows}</tbody></table></div>\n")
-}
-
-/// Text that is no markup.
-pub fn escaped(text: &str) -> String {
-    let mut found = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '&' => found.push_str("&amp;"),
-            '<' => found.push_str("&lt;"),
-            '>' => found.push_str("&gt;"),
-            '"' => found.push_str("&quot;"),
-            // Not allowed in a page, whatever a command line holds.
-            letter if letter.is_control() => found.push('\u{fffd}'),
-            letter => found.push(letter),
-        }
-    }
-    found
 }
 
 /// Two things beside each other.

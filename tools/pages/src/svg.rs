@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::page::escaped;
+use crate::markup::escaped;
 
 /// A point: to the right and down, in units of the drawing.
 pub type Point = (f64, f64);
