@@ -196,7 +196,7 @@ impl Path {
             label((first.x, first.y), "start".to_owned()),
             label((last.x, last.y), "end".to_owned()),
         ];
-        let arrow_m = 0.02 * (xs[1] - xs[0]).max(ys[1] - ys[0]);
+        let arrow_m = 0.03 * (xs[1] - xs[0]).max(ys[1] - ys[0]);
         let mut curves = self.way([first.t_s, last.t_s], Colour::Soft, Stroke::Solid);
         let mut entries = vec![entry(Colour::Soft, Stroke::Solid, "no fault is active")];
         for life in faults.iter().filter(|life| life.was_present()) {

@@ -23,10 +23,7 @@ use vigil_terminal::{CommandError, Outcome};
 pub struct Args {
     /// A recording of the black box, such as `vigil recordings` lists; one that is cut short is
     /// shown as far as it goes.
-    #[arg(
-        value_name = "RECORDING",
-        conflicts_with_all = ["FilterArgs", "IntervalArgs", "RobotArgs"]
-    )]
+    #[arg(value_name = "RECORDING")]
     recording: Option<PathBuf>,
     #[command(flatten)]
     frames: FramesArgs,
@@ -55,8 +52,18 @@ impl FromArgMatches for FramesArgs {
 impl clap::Args for FramesArgs {
     fn augment_args(command: Command) -> Command {
         let command = <FilterArgs as clap::Args>::augment_args(command);
-        let command = command.mut_arg("model", |arg| arg.required(false).requires("frames"));
-        command.mut_arg("frames", |arg| arg.required(false).requires("model"))
+        command.mut_args(|arg| match arg.get_id().as_str() {
+            "recording" => arg,
+            "model" => arg
+                .required(false)
+                .requires("frames")
+                .conflicts_with("recording"),
+            "frames" => arg
+                .required(false)
+                .requires("model")
+                .conflicts_with("recording"),
+            _ => arg.conflicts_with("recording"),
+        })
     }
 
     fn augment_args_for_update(command: Command) -> Command {

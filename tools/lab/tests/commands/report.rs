@@ -290,7 +290,7 @@ fn a_page_is_of_a_recording_or_of_frames() {
             &[][..],
             "give a RECORDING (MCAP), or frames with --model and --frames",
         ),
-        (&[&no_recording], "a.mcap is no MCAP file"),
+        (&[no_recording.as_str()], "a.mcap is no MCAP file"),
         (&["missing.mcap"], "cannot read missing.mcap"),
         (
             &["a.mcap", "--seed", "3"],
