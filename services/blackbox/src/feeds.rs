@@ -3,8 +3,8 @@
 use std::io;
 
 use vigil_blocks::{
-    Action, Block, BlockId, Control, DetectionBelief, Event, FaultBelief, Faults, Health,
-    ParticleBlock, SensorFrame, Truth,
+    Action, Block, BlockId, CheckpointPart, Control, DetectionBelief, Event, FaultBelief, Faults,
+    Health, Journal, ParticleBlock, SensorFrame, Truth,
 };
 use vigil_cycle::port::TopicBlock;
 use vigil_cycle::topic::ServiceName;
@@ -143,6 +143,8 @@ pub struct Feeds {
     truth: Feed<Truth>,
     health: Vec<HealthFeed>,
     control: Vec<Feed<Control>>,
+    journals: Vec<Feed<Journal>>,
+    checkpoints: Vec<Feed<CheckpointPart>>,
     began_ns: u64,
     /// True while the detector's alarm stands.
     is_alarm: bool,
@@ -165,6 +167,8 @@ impl Feeds {
         };
         let controlled = [ServiceName::SensorSim, ServiceName::Supervisor];
         let control = |service| Feed::open(graph, Topic::Control(service), 0);
+        let journal = |service| Feed::open(graph, Topic::Journal(service), 0);
+        let checkpoint = |service| Feed::open(graph, Topic::Checkpoint(service), 0);
         let particles = |topic| Feed::open(graph, topic, PARTICLES_APART_NS);
         Ok(Self {
             sensor: Feed::open(graph, Topic::Sensor, 0)?,
@@ -182,6 +186,14 @@ impl Feeds {
             control: controlled
                 .into_iter()
                 .map(control)
+                .collect::<Result<_, _>>()?,
+            journals: ServiceName::STEPPING
+                .into_iter()
+                .map(journal)
+                .collect::<Result<_, _>>()?,
+            checkpoints: ServiceName::STEPPING
+                .into_iter()
+                .map(checkpoint)
                 .collect::<Result<_, _>>()?,
             began_ns: Monotonic.now_ns(),
             is_alarm: false,
@@ -216,6 +228,12 @@ impl Feeds {
         for control in &mut self.control {
             control.drain(&mut look, |_| {})?;
         }
+        for journal in &mut self.journals {
+            journal.drain(&mut look, |_| {})?;
+        }
+        for checkpoint in &mut self.checkpoints {
+            checkpoint.drain(&mut look, |_| {})?;
+        }
         ring.commit()
     }
 
@@ -234,6 +252,8 @@ impl Feeds {
     pub fn lost(&self) -> u64 {
         let health = self.health.iter().map(|health| health.feed.lost);
         let control = self.control.iter().map(|control| control.lost);
+        let journals = self.journals.iter().map(|journal| journal.lost);
+        let checkpoints = self.checkpoints.iter().map(|checkpoint| checkpoint.lost);
         let others = [
             self.sensor.lost,
             self.detection.lost,
@@ -244,7 +264,8 @@ impl Feeds {
             self.action.lost,
             self.truth.lost,
         ];
-        let all = health.chain(control).chain(others);
+        let kept = journals.chain(checkpoints);
+        let all = health.chain(control).chain(kept).chain(others);
         all.fold(0, u64::saturating_add)
     }
 }

@@ -1,10 +1,13 @@
 //! The detector at its ports.
 
 use vigil_blocks::{
-    Cause, DetectionBelief, Entry, EventKind, ParticleBlock, Readiness, SensorFrame,
+    Cause, DetectionBelief, Entry, EventKind, JournalEntry, JournalKind, ParticleBlock, Readiness,
+    SensorFrame,
 };
+use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    Clock, Graph, HealthBoard, Intake, PortError, Receiver, Sender, Stage, Stamp, Topic, Writer,
+    Clock, Graph, HealthBoard, Intake, JournalWriter, PortError, Receiver, Sender, Stage, Stamp,
+    Topic, Writer,
 };
 
 use vigil_robot::{Description, FrameGuard};
@@ -30,6 +33,7 @@ pub struct DetectorStage {
     symptoms_reported: u32,
     sight: SightReport,
     context: ContextReport,
+    journal: JournalWriter,
 }
 
 /// The last change that is no fault, and how many the timeline has.
@@ -126,6 +130,7 @@ impl DetectorStage {
             symptoms_reported: 0,
             sight: SightReport::default(),
             context: ContextReport::default(),
+            journal: JournalWriter::open(graph, ServiceName::Detector)?,
         })
     }
 }
@@ -144,11 +149,15 @@ impl Stage for DetectorStage {
                 if before != 0 && before != self.epoch {
                     // A publisher that starts anew may have another clock.
                     self.detector.step(Entry::Reset, belief, hypotheses);
+                    self.journal.note(JournalEntry::of(JournalKind::Reset, 0));
                 }
                 self.detector.step(Entry::Frame(&frame), belief, hypotheses);
+                let entry = JournalEntry::of(JournalKind::Frame, 1);
+                self.journal.note(entry.with_input(frame.header.id()));
                 intake.stepped(&frame.header, frame.header.id());
             } else {
                 self.detector.refuse();
+                self.journal.note(JournalEntry::of(JournalKind::Refused, 1));
             }
         }
     }
@@ -156,6 +165,8 @@ impl Stage for DetectorStage {
     fn miss(&mut self, count: u32) {
         let (belief, hypotheses) = (self.belief.block(), self.hypotheses.block());
         self.detector.step(Entry::Missed(count), belief, hypotheses);
+        self.journal
+            .note(JournalEntry::of(JournalKind::Missed, count));
     }
 
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
@@ -166,6 +177,7 @@ impl Stage for DetectorStage {
         self.context.take(belief);
         (self.sight.blind, self.sight.readiness) = (belief.blind, belief.readiness);
         self.hypotheses.block().cause = cause;
+        self.journal.answer(&*self.belief);
         // Hypotheses first: they are there when the belief wakes the identifier.
         self.hypotheses.send(stamp, clock)?;
         self.belief.send(stamp, clock)
@@ -204,5 +216,9 @@ impl Stage for DetectorStage {
             health.event(now_ns, kind, 0, self.p_fault, 0);
             self.alarm_reported = self.alarm;
         }
+    }
+
+    fn keep_journal(&mut self, stamp: Stamp, clock: &dyn Clock) -> Result<(), PortError> {
+        self.journal.publish(&self.detector, stamp, clock)
     }
 }

@@ -3,12 +3,13 @@
 use std::collections::VecDeque;
 
 use vigil_blocks::{
-    BlockId, Cause, CauseKind, DetectionBelief, Entry, EventKind, FaultBelief, MODE_BLIND,
-    ParticleBlock, SensorFrame,
+    BlockId, Cause, CauseKind, DetectionBelief, Entry, EventKind, FaultBelief, JournalEntry,
+    JournalKind, MODE_BLIND, ParticleBlock, SensorFrame,
 };
+use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    Clock, Graph, HealthBoard, InputAccount, Intake, PortError, Receiver, Sender, Stage, Stamp,
-    Topic, Writer,
+    Clock, Graph, HealthBoard, InputAccount, Intake, JournalWriter, PortError, Receiver, Sender,
+    Stage, Stamp, Topic, Writer,
 };
 
 use vigil_robot::{Description, FrameGuard};
@@ -43,6 +44,7 @@ pub struct IdentifierStage {
     /// The mode that the timeline has. Blindness is the detector's to report.
     mode_reported: u32,
     size: SizeReport,
+    journal: JournalWriter,
 }
 
 /// The last belief, for the timeline.
@@ -92,6 +94,7 @@ impl IdentifierStage {
             changes_reported: 0,
             mode_reported: 0,
             size: SizeReport::default(),
+            journal: JournalWriter::open(graph, ServiceName::Identifier)?,
         })
     }
 
@@ -149,8 +152,14 @@ impl IdentifierStage {
             let before = std::mem::replace(&mut self.epoch, frame.header.epoch);
             if before != 0 && before != self.epoch {
                 self.identifier.step(Entry::Reset, belief, out);
+                self.journal.note(JournalEntry::of(JournalKind::Reset, 0));
             }
             self.identifier.step(Entry::Frame(input), belief, out);
+            let mut entry = JournalEntry::of(JournalKind::Frame, 1).with_input(frame.header.id());
+            if let Some((detection, _)) = detection {
+                entry = entry.with_detection(detection.header.id(), detection.blind);
+            }
+            self.journal.note(entry);
         }
         true
     }
@@ -176,6 +185,9 @@ impl Stage for IdentifierStage {
                 continue;
             }
             self.identifier.look(detection);
+            let entry = JournalEntry::of(JournalKind::Looked, 0);
+            self.journal
+                .note(entry.with_detection(header.id(), detection.blind));
             let newest = header.id();
             let before = std::mem::replace(&mut self.detection, newest);
             let is_next =
@@ -196,6 +208,8 @@ impl Stage for IdentifierStage {
     fn miss(&mut self, count: u32) {
         let (belief, out) = (self.belief.block(), self.hypotheses.block());
         self.identifier.step(Entry::Missed(count), belief, out);
+        self.journal
+            .note(JournalEntry::of(JournalKind::Missed, count));
     }
 
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
@@ -217,6 +231,7 @@ impl Stage for IdentifierStage {
         };
         self.size.take(belief);
         self.hypotheses.block().cause = cause;
+        self.journal.answer(&*self.belief);
         let published_ns = self.belief.send(stamp, clock)?;
         // The hypotheses have observers only: after the belief.
         self.hypotheses.send(stamp, clock)?;
@@ -239,6 +254,8 @@ impl Stage for IdentifierStage {
     fn limit(&mut self, particles: u32) {
         let (belief, out) = (self.belief.block(), self.hypotheses.block());
         self.identifier.step(Entry::Budget(particles), belief, out);
+        self.journal
+            .note(JournalEntry::of(JournalKind::Budget, particles));
     }
 
     fn has_input(&self) -> bool {
@@ -274,5 +291,9 @@ impl Stage for IdentifierStage {
             let sd = news.sd.to_bits();
             health.event(now_ns, EventKind::Size, news.what, news.size, sd);
         }
+    }
+
+    fn keep_journal(&mut self, stamp: Stamp, clock: &dyn Clock) -> Result<(), PortError> {
+        self.journal.publish(&self.identifier, stamp, clock)
     }
 }

@@ -2,11 +2,12 @@
 
 use vigil_blocks::{
     Action, AnsweredWheels, Cause, CauseKind, ControlMode, DetectionBelief, Entry, EventKind,
-    FaultBelief, Weighing,
+    FaultBelief, JournalEntry, JournalKind, Weighing,
 };
+use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    Clock, Graph, HealthBoard, InputAccount, Intake, PortError, Receiver, Sender, Stage, Stamp,
-    Topic,
+    Clock, Graph, HealthBoard, InputAccount, Intake, JournalWriter, PortError, Receiver, Sender,
+    Stage, Stamp, Topic,
 };
 
 use vigil_decision::{Inputs, Supervisor};
@@ -34,6 +35,7 @@ pub struct SupervisorStage {
     alarm_reported: AlarmCount,
     board: FaultBoard,
     latched_reported: Option<usize>,
+    journal: JournalWriter,
 }
 
 /// Whether the fused alarm stands, and how many there were.
@@ -91,6 +93,7 @@ impl SupervisorStage {
             alarm_reported: AlarmCount::default(),
             board,
             latched_reported: None,
+            journal: JournalWriter::open(graph, ServiceName::Supervisor)?,
         })
     }
 
@@ -153,6 +156,18 @@ impl SupervisorStage {
     }
 }
 
+/// What the step takes, by name.
+fn journal_entry(inputs: Inputs<'_>) -> JournalEntry {
+    let mut entry = JournalEntry::of(JournalKind::Frame, 1);
+    if let Some(diagnosis) = inputs.diagnosis {
+        entry = entry.with_input(diagnosis.header.id());
+    }
+    if let Some(detection) = inputs.detection {
+        entry = entry.with_detection(detection.header.id(), detection.blind);
+    }
+    entry
+}
+
 impl Stage for SupervisorStage {
     fn take(&mut self, intake: &mut Intake<'_>) {
         self.take_detections(intake);
@@ -167,6 +182,7 @@ impl Stage for SupervisorStage {
                     diagnosis: Some(diagnosis),
                     detection,
                 };
+                self.journal.note(journal_entry(inputs));
                 self.supervisor
                     .step(Entry::Frame(inputs), self.action.block());
                 self.board.take(diagnosis, self.detection.readiness);
@@ -179,11 +195,14 @@ impl Stage for SupervisorStage {
     fn miss(&mut self, count: u32) {
         self.supervisor
             .step(Entry::Missed(count), self.action.block());
+        self.journal
+            .note(JournalEntry::of(JournalKind::Missed, count));
         if self.detection_is_new {
             let inputs = Inputs {
                 diagnosis: None,
                 detection: Some(&*self.detection),
             };
+            self.journal.note(journal_entry(inputs));
             self.supervisor
                 .step(Entry::Frame(inputs), self.action.block());
             self.detection_is_new = false;
@@ -222,6 +241,7 @@ impl Stage for SupervisorStage {
         if let Some(failure) = self.board.failure() {
             return Err(failure);
         }
+        self.journal.answer(&*self.action);
         self.action.send(stamp, clock)
     }
 
@@ -251,5 +271,9 @@ impl Stage for SupervisorStage {
             }
             self.decision_reported = seq;
         }
+    }
+
+    fn keep_journal(&mut self, stamp: Stamp, clock: &dyn Clock) -> Result<(), PortError> {
+        self.journal.publish(&self.supervisor, stamp, clock)
     }
 }

@@ -1,6 +1,7 @@
 //! The supervisor's decision: what to do.
 
 use strum::FromRepr;
+use vigil_checkpoint::CheckpointValue;
 
 use crate::answered_wheels::AnsweredWheels;
 use crate::block::block;
@@ -107,7 +108,7 @@ impl Action {
 }
 
 /// What the robot is to do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr, CheckpointValue)]
 #[repr(u32)]
 pub enum RecoveryKind {
     /// Nothing decided: the robot stops.
@@ -170,7 +171,7 @@ pub enum ValueKind {
 }
 
 /// How an action was chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, CheckpointValue)]
 #[repr(u32)]
 pub enum ControlMode {
     /// By the policy, from a belief with fresh evidence.

@@ -1,9 +1,11 @@
 //! The wheels that an action is about.
 
+use vigil_checkpoint::CheckpointValue;
+
 use crate::sensor::WHEELS;
 
 /// Wheels whose faults an action answers, as bits in the order of the robot's wheels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, CheckpointValue)]
 pub struct AnsweredWheels {
     /// Those that are stuck, against which the robot steers.
     pub stuck: u16,

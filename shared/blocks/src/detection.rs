@@ -1,6 +1,7 @@
 //! The detector's belief: is something wrong?
 
 use strum::{FromRepr, IntoStaticStr, VariantArray};
+use vigil_checkpoint::CheckpointValue;
 
 use crate::block::block;
 use crate::header::{Cause, Header};
@@ -85,7 +86,9 @@ block! {
 }
 
 /// Why no valid frame has been seen for a second. A robot that stands by command is not blind.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr, IntoStaticStr, VariantArray)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, FromRepr, IntoStaticStr, VariantArray, CheckpointValue,
+)]
 #[strum(serialize_all = "kebab-case")]
 #[repr(u32)]
 pub enum Blindness {

@@ -1,4 +1,10 @@
-//! Journal entries: the only input of a service's `step`.
+//! Journal entries: the only input of a service's `step`, and how they are published.
+
+use strum::FromRepr;
+
+use crate::block::block;
+use crate::header::{BlockId, Header};
+use crate::layout::part;
 
 /// What a `step` is told. The same sequence of entries and the same seed give bit-identical
 /// beliefs, live, in replay, in evaluation and in tests.
@@ -13,4 +19,150 @@ pub enum Entry<I> {
     Budget(u32),
     /// Forget everything: a new run begins.
     Reset,
+}
+
+/// Entries in a block.
+pub const JOURNAL_ENTRIES: usize = 8;
+
+/// Bytes of a state in a block.
+pub const CHECKPOINT_BYTES: usize = 16_384;
+
+/// What a [`JournalEntry`] says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr)]
+#[repr(u32)]
+pub enum JournalKind {
+    /// The service has begun: its state is that of the configuration.
+    Begun = 1,
+    /// [`Entry::Frame`]: input and, where there is one, the detection beside it.
+    Frame = 2,
+    /// [`Entry::Missed`]; `count` periods.
+    Missed = 3,
+    /// [`Entry::Budget`]; `count` particles or hypotheses.
+    Budget = 4,
+    /// [`Entry::Reset`].
+    Reset = 5,
+    /// A frame was refused at the border.
+    Refused = 6,
+    /// A detection was seen for its blindness alone.
+    Looked = 7,
+}
+
+part! {
+/// One entry of a service's journal. Blocks are named, not repeated: they stand in their topics.
+#[derive(Eq)]
+pub struct JournalEntry, size 48 {
+    /// A [`JournalKind`].
+    pub kind: u32,
+    /// Periods that were missed; particles that are allowed.
+    pub count: u32,
+    /// The input: a sensor frame; for the supervisor a diagnosis. Epoch 0 stands for none.
+    pub input_epoch: u64,
+    /// See `input_epoch`.
+    pub input_seq: u64,
+    /// The detection that was taken with it. Epoch 0 stands for none.
+    pub detection_epoch: u64,
+    /// See `detection_epoch`.
+    pub detection_seq: u64,
+    /// The blindness that the detection was taken with, which a later prediction may have said.
+    pub blind: u32,
+    /// Reserved, zero.
+    pub reserved: u32,
+}
+}
+
+impl JournalEntry {
+    /// An entry without input.
+    #[must_use]
+    pub fn of(kind: JournalKind, count: u32) -> Self {
+        Self {
+            kind: kind as u32,
+            count,
+            ..Self::default()
+        }
+    }
+
+    /// The same entry with this input.
+    #[must_use]
+    pub const fn with_input(mut self, id: BlockId) -> Self {
+        (self.input_epoch, self.input_seq) = (id.epoch, id.seq);
+        self
+    }
+
+    /// The same entry with this detection, taken as `blind` says.
+    #[must_use]
+    pub const fn with_detection(mut self, id: BlockId, blind: u32) -> Self {
+        (self.detection_epoch, self.detection_seq) = (id.epoch, id.seq);
+        self.blind = blind;
+        self
+    }
+
+    /// The input, if there is one.
+    #[must_use]
+    pub fn input(&self) -> Option<BlockId> {
+        let (epoch, seq) = (self.input_epoch, self.input_seq);
+        (epoch != 0).then_some(BlockId { epoch, seq })
+    }
+
+    /// The detection, if there is one.
+    #[must_use]
+    pub fn detection(&self) -> Option<BlockId> {
+        let (epoch, seq) = (self.detection_epoch, self.detection_seq);
+        (epoch != 0).then_some(BlockId { epoch, seq })
+    }
+}
+
+block! {
+    /// What a service's step took in one turn, in order, and which block it published then. A turn
+    /// of more entries takes several blocks; the last one says what was published.
+    pub struct Journal, size 456 {
+        /// Common header.
+        pub header: Header,
+        /// Epoch of the belief or action that was published after these entries; 0 for none.
+        pub answer_epoch: u64,
+        /// Its sequence number.
+        pub answer_seq: u64,
+        /// Entries that were lost since the service began, for want of room.
+        pub lost: u32,
+        /// Entries in use.
+        pub count: u32,
+        /// The entries.
+        pub entries: [JournalEntry; JOURNAL_ENTRIES],
+    }
+}
+
+impl Journal {
+    /// The entries in use.
+    #[must_use]
+    pub fn used(&self) -> &[JournalEntry] {
+        &self.entries[..(self.count as usize).min(JOURNAL_ENTRIES)]
+    }
+
+    /// The block that was published after these entries, if there is one.
+    #[must_use]
+    pub fn answer(&self) -> Option<BlockId> {
+        let (epoch, seq) = (self.answer_epoch, self.answer_seq);
+        (epoch != 0).then_some(BlockId { epoch, seq })
+    }
+}
+
+block! {
+    /// A part of a service's state, from which a replay can go on.
+    pub struct CheckpointPart, size 16464 {
+        /// Common header.
+        pub header: Header,
+        /// The state is that after the journal's block of this sequence number.
+        pub journal_seq: u64,
+        /// Place of this part in the state, bytes.
+        pub offset: u32,
+        /// Bytes of this part.
+        pub size: u32,
+        /// Bytes of the whole state.
+        pub whole: u32,
+        /// Reserved, zero.
+        pub reserved: u32,
+        /// FNV-1a of the whole state.
+        pub hash: u64,
+        /// The part.
+        pub bytes: [u8; CHECKPOINT_BYTES],
+    }
 }

@@ -3,6 +3,7 @@
 mod action;
 mod answered_wheels;
 mod block;
+mod checkpoint;
 mod control;
 pub mod datagram;
 mod detection;
@@ -37,7 +38,9 @@ pub use diagnosis::{
 pub use faults::{FAULTS, FaultRecord, FaultSource, FaultState, Faults, OverallState, Severity};
 pub use header::{BlockId, Cause, CauseKind, Header};
 pub use health::{Degraded, EVENTS, Event, EventKind, Health, ServiceState};
-pub use journal::Entry;
+pub use journal::{
+    CHECKPOINT_BYTES, CheckpointPart, Entry, JOURNAL_ENTRIES, Journal, JournalEntry, JournalKind,
+};
 pub use particles::{HealthyBelief, PARTICLE_CAPACITY, ParticleBlock, WeightedHypothesis};
 pub use rejection::{REJECTIONS, Rejection};
 pub use sensor::{ActionOutcome, CHANNELS, COMMANDS, SensorFrame, Symptoms, WHEELS};

@@ -1,12 +1,15 @@
 //! In which way a component is broken, and what the size of its fault is.
 
 use strum::{FromRepr, VariantArray};
+use vigil_checkpoint::CheckpointValue;
 
 /// The way in which a component is most probably broken: it gives the fault's size its unit.
 ///
 /// A size is what a sensor's reading or an actuator does beside what it should. Some ways have no
 /// size: their name says all.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, FromRepr, VariantArray)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, Default, FromRepr, VariantArray, CheckpointValue,
+)]
 #[repr(u32)]
 pub enum SizeKind {
     /// Nothing is said of the way or the size.

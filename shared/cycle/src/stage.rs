@@ -78,6 +78,14 @@ pub trait Stage {
     /// Reports events of the last step, adds the accounts of further inputs (anew in each turn),
     /// handles control commands. Off the critical path.
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64);
+
+    /// Publishes the journal of this turn, see [`crate::JournalWriter::publish`]. The last of all.
+    ///
+    /// # Errors
+    /// The transport's.
+    fn keep_journal(&mut self, _stamp: Stamp, _clock: &dyn Clock) -> Result<(), PortError> {
+        Ok(())
+    }
 }
 
 /// What the stage takes in one turn.
@@ -326,6 +334,7 @@ impl StageCycle {
             is_published: frames > 0,
         };
         self.report(stage, turn, clock)?;
+        stage.keep_journal(self.last_stamp, clock)?;
         Ok(self.account.verdict(missed))
     }
 

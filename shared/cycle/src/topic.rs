@@ -23,6 +23,10 @@ pub enum Topic {
     Health(ServiceName),
     /// Commands to a service.
     Control(ServiceName),
+    /// What a service's step took, in order.
+    Journal(ServiceName),
+    /// The state of a service's step, now and then.
+    Checkpoint(ServiceName),
 }
 
 /// The services of the graph, in the order of the data.
@@ -46,6 +50,9 @@ impl ServiceName {
         Self::Identifier,
         Self::Supervisor,
     ];
+
+    /// Those that work in steps, and keep a journal of them.
+    pub const STEPPING: [Self; 3] = [Self::Detector, Self::Identifier, Self::Supervisor];
 
     /// Name, as in topics, configuration and reports.
     #[must_use]
@@ -72,7 +79,7 @@ impl ServiceName {
 
 impl Topic {
     /// Every topic on which something is published.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 20] = [
         Self::Sensor,
         Self::Detection,
         Self::DetectionParticles,
@@ -87,6 +94,12 @@ impl Topic {
         Self::Health(ServiceName::Supervisor),
         Self::Control(ServiceName::SensorSim),
         Self::Control(ServiceName::Supervisor),
+        Self::Journal(ServiceName::Detector),
+        Self::Journal(ServiceName::Identifier),
+        Self::Journal(ServiceName::Supervisor),
+        Self::Checkpoint(ServiceName::Detector),
+        Self::Checkpoint(ServiceName::Identifier),
+        Self::Checkpoint(ServiceName::Supervisor),
     ];
 
     /// Name within its graph.
@@ -103,6 +116,8 @@ impl Topic {
             Self::Truth => "truth".to_owned(),
             Self::Health(service) => format!("health/{}", service.as_str()),
             Self::Control(service) => format!("control/{}", service.as_str()),
+            Self::Journal(service) => format!("journal/{}", service.as_str()),
+            Self::Checkpoint(service) => format!("checkpoint/{}", service.as_str()),
         }
     }
 

@@ -4,6 +4,7 @@
 use vigil_blocks::{
     Action, CauseKind, DetectionBelief, Entry, FaultBelief, MODE_BLIND, Readiness, RecoveryKind,
 };
+use vigil_checkpoint::Checkpoint;
 use vigil_robot::fused_alarm::{FusedAlarm, StageBeliefs};
 
 use crate::inputs::Inputs;
@@ -39,7 +40,7 @@ pub(crate) struct Situation {
 }
 
 /// Follows detections and diagnoses.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub(crate) struct AlarmFusion {
     alarm: FusedAlarm,
     /// As in the last detection.

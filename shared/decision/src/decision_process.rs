@@ -4,12 +4,14 @@
 use vigil_blocks::{
     Action, AnsweredWheels, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind, ValueKind,
 };
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_pomdp::policy::Measure;
 use vigil_pomdp::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
 
 use crate::alarm_fusion::Situation;
 use crate::error::SupervisorError;
 use crate::inputs::Inputs;
+use crate::kept;
 use crate::latch::{Latch, stands};
 use crate::mapping::{self, ActionMeaning};
 use crate::policy;
@@ -21,7 +23,7 @@ use crate::wheels::Wheels;
 const SUM_TOLERANCE: f64 = 1e-9;
 
 /// How one kind of evidence becomes a decision.
-pub(crate) trait DecisionRule {
+pub(crate) trait DecisionRule: Checkpoint {
     /// Takes what the stages publish while the detector is not blind.
     fn take(&mut self, inputs: Inputs<'_>, situation: Situation);
 
@@ -46,7 +48,7 @@ pub(crate) trait DecisionRule {
 }
 
 /// What the robot is to do; a change of it is a new decision.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub(crate) struct Instruction {
     pub action: usize,
     pub kind: RecoveryKind,
@@ -54,7 +56,7 @@ pub(crate) struct Instruction {
 }
 
 /// A step of the decision model.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, CheckpointValue)]
 pub(crate) struct Step {
     /// `belief_count` when it was made.
     pub belief: u64,
@@ -64,14 +66,21 @@ pub(crate) struct Step {
 }
 
 /// A decision model with its belief, policy and present choice.
+#[derive(Checkpoint)]
 pub(crate) struct DecisionProcess {
+    #[checkpoint(fixed)]
     pub model: Pomdp,
+    #[checkpoint(with = kept::tracker)]
     pub tracker: Tracker,
+    #[checkpoint(with = kept::decider)]
     pub decider: Decider,
+    #[checkpoint(fixed)]
     pub actions: Vec<ActionMeaning>,
     pub losses: StageLossMonitor,
     /// One number per state, of no meaning between two uses.
+    #[checkpoint(fixed)]
     pub scratch: Vec<f64>,
+    #[checkpoint(with = kept::choice)]
     pub choice: Choice,
     pub decision_seq: u64,
     pub log_evidence: f64,

@@ -14,6 +14,7 @@
 use std::collections::BTreeMap;
 
 use vigil_blocks::{ActionOutcome, DetectionBelief, Symptoms};
+use vigil_checkpoint::Checkpoint;
 
 use crate::settings::{Counts, OwnSymptom};
 
@@ -70,8 +71,9 @@ pub(crate) struct Limits {
 }
 
 /// What an epoch has gathered.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub(crate) struct Epoch {
+    #[checkpoint(fixed)]
     kinds: SymptomKinds,
     began_ns: Option<u64>,
     standing: u32,

@@ -1,6 +1,7 @@
 //! Decisions about the leaves of the fault tree: the identifier's belief is the evidence.
 
 use vigil_blocks::{Action, ControlMode, DetectionBelief, FaultBelief};
+use vigil_checkpoint::Checkpoint;
 use vigil_pomdp::policy::Measure;
 use vigil_pomdp::{Choice, Control};
 use vigil_robot::{Description, FaultTree};
@@ -21,7 +22,9 @@ use crate::switching_cost::SwitchingCost;
 use crate::wheels::Wheels;
 
 /// Tells when an epoch is over.
+#[derive(Checkpoint)]
 struct EpochClock {
+    #[checkpoint(fixed)]
     epoch_ns: u64,
     /// Capture time at which the present epoch began.
     t_capture_ns: Option<u64>,
@@ -43,9 +46,12 @@ impl EpochClock {
 }
 
 /// Takes over the identifier's belief, tracks whether evidence still comes, and chooses actions.
+#[derive(Checkpoint)]
 pub(crate) struct FaultDecision {
     process: DecisionProcess,
+    #[checkpoint(fixed)]
     tree_hash: u64,
+    #[checkpoint(fixed)]
     states: Vec<StateMeaning>,
     wheels: Wheels,
     settling: Settling,

@@ -1,6 +1,7 @@
 //! What is known of the hardware, for a model of navigation and hardware together.
 
 use vigil_blocks::{DECISION_STATES, DetectionBelief, FaultBelief};
+use vigil_checkpoint::Checkpoint;
 use vigil_pomdp::Pomdp;
 use vigil_robot::FaultTree;
 
@@ -12,8 +13,11 @@ use crate::state_belief::{self, normalise, write_fallback, write_weights};
 use crate::states::StateMeaning;
 
 /// Probabilities of the hardware's states, as the identifier holds them.
+#[derive(Checkpoint)]
 pub(crate) struct HardwareBelief {
+    #[checkpoint(fixed)]
     states: JointStates,
+    #[checkpoint(fixed)]
     tree_hash: u64,
     /// Of no meaning unless `is_known`.
     p: [f64; DECISION_STATES],

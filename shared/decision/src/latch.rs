@@ -2,10 +2,11 @@
 //! was given up. A robot that brakes and then stands looks healthy, whatever is wrong with it.
 
 use vigil_blocks::RecoveryKind;
+use vigil_checkpoint::Checkpoint;
 use vigil_pomdp::{Choice, Control};
 
 /// The action that stands, once it was taken.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Checkpoint)]
 pub(crate) struct Latch {
     action: Option<usize>,
 }

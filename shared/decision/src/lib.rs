@@ -11,6 +11,7 @@ mod fault_life;
 mod hardware_belief;
 mod inputs;
 mod joint_states;
+mod kept;
 mod latch;
 mod mapping;
 mod observations;

@@ -6,6 +6,7 @@
 //! that it still comes is seen where the belief moves.
 
 use vigil_blocks::DECISION_STATES;
+use vigil_checkpoint::Checkpoint;
 
 use crate::state_belief::MOVED;
 use crate::states::{StateMeaning, Subject};
@@ -15,7 +16,7 @@ use crate::states::{StateMeaning, Subject};
 const SETTLED_P: f64 = 0.8;
 
 /// How probable it is that no more evidence comes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Checkpoint)]
 pub(crate) struct Settling {
     p_settled: f64,
     is_settled: bool,

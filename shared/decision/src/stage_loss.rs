@@ -1,5 +1,7 @@
 //! Which stages are lost: nothing has come from them for several cycles.
 
+use vigil_checkpoint::Checkpoint;
+
 /// Misses in a row after which a stage counts as lost. As for every input of a service
 /// (`vigil_cycle`): one late cycle is the machine's, three in a row are the stage's.
 const LOST_AFTER_MISSES: u32 = 3;
@@ -9,10 +11,11 @@ const IDENTIFIER_LOST: u32 = 1;
 const DETECTOR_LOST: u32 = 2;
 
 /// Counts misses in a row.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub(crate) struct StageLossMonitor {
     misses: u32,
     misses_without_detection: u32,
+    #[checkpoint(fixed)]
     blind_after_misses: u32,
 }
 

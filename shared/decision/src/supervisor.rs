@@ -1,6 +1,7 @@
 //! One decision cycle.
 
 use vigil_blocks::{Action, Entry};
+use vigil_checkpoint::Checkpoint;
 use vigil_pomdp::{PointBased, Pomdp};
 use vigil_robot::{Description, FaultTree};
 
@@ -15,6 +16,7 @@ use crate::settings::{self, Settings};
 use crate::symptom_decision::SymptomDecision;
 
 /// Tracks the belief of the recovery POMDP and chooses actions.
+#[derive(Checkpoint)]
 pub struct Supervisor {
     fusion: AlarmFusion,
     rule: Box<dyn DecisionRule>,
@@ -112,6 +114,7 @@ mod tests {
     use crate::alarm_fusion::Situation;
 
     /// Publishes the number that it is given.
+    #[derive(Checkpoint)]
     struct Numbered(u64);
 
     impl DecisionRule for Numbered {

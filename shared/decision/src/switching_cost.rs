@@ -8,10 +8,12 @@
 //! turns in being better do not take turns in being taken.
 
 use vigil_blocks::DECISION_ACTIONS;
+use vigil_checkpoint::Checkpoint;
 
 /// What was lost so far by not taking other actions.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub(crate) struct SwitchingCost {
+    #[checkpoint(fixed)]
     cost: f64,
     /// For each action what it would have earned more, never below 0.
     regret: [f64; DECISION_ACTIONS],

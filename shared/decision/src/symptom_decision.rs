@@ -4,6 +4,7 @@
 use vigil_blocks::{
     Action, ActionOutcome, ControlMode, DetectionBelief, FaultBelief, RecoveryKind,
 };
+use vigil_checkpoint::Checkpoint;
 use vigil_robot::{Description, FaultTree};
 
 use crate::alarm_fusion::Situation;
@@ -33,11 +34,15 @@ use crate::wheels::Wheels;
 /// A call for help, or a task given up, stands until a new run or a reset, whatever is believed
 /// meanwhile: a robot that stands looks healthy. A new run resets the belief, unless its first
 /// frame says that the action succeeded: then that action is the model's step.
+#[derive(Checkpoint)]
 pub(crate) struct SymptomDecision {
     process: DecisionProcess,
+    #[checkpoint(fixed)]
     observations: Observations,
     /// By action: whether it reports its outcome as an observation.
+    #[checkpoint(fixed)]
     reports_outcome: Vec<bool>,
+    #[checkpoint(each)]
     hardware: Option<HardwareBelief>,
     wheels: Wheels,
     epoch: Epoch,

@@ -2,6 +2,7 @@
 
 use vigil_blocks::RecoveryKind;
 use vigil_blocks::{Action, AnsweredWheels, FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet};
+use vigil_checkpoint::Checkpoint;
 use vigil_pomdp::Pomdp;
 use vigil_robot::{Description, FaultTree, counter_steering};
 
@@ -18,12 +19,16 @@ const NAMED: f64 = 0.5;
 const FAR_MORE: f64 = 2.0;
 
 /// The faults of wheels as the identifier holds them, and the wheels of the present action.
+#[derive(Checkpoint)]
 pub(crate) struct Wheels {
+    #[checkpoint(fixed)]
     leaves: Vec<Leaf>,
     /// Probability of every node of the tree, and the most probable sets, as of the last decision.
     p: [f64; FAULT_NODES],
     sets: [FaultSet; FAULT_SETS],
+    #[checkpoint(fixed)]
     answerable: AnswerableFaults,
+    #[checkpoint(fixed)]
     compensation: Vec<Compensation>,
     about: AnsweredWheels,
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use vigil_blocks::layout::Layout;
-use vigil_blocks::{Block, Control, ParticleBlock};
+use vigil_blocks::{Block, CheckpointPart, Control, Journal, ParticleBlock};
 use vigil_cycle::topic::Topic;
 use vigil_setup::Setup;
 use vigil_timeline::{TimelineEntry, WallClock};
@@ -111,6 +111,14 @@ impl FlightWriter {
             }
             Topic::Control(_) => {
                 let times = self.keep::<Control>(topic, bytes)?;
+                times.map(|_| Ok(Outcome::Messages))
+            }
+            Topic::Journal(_) => {
+                let times = self.keep::<Journal>(topic, bytes)?;
+                times.map(|_| Ok(Outcome::Messages))
+            }
+            Topic::Checkpoint(_) => {
+                let times = self.keep::<CheckpointPart>(topic, bytes)?;
                 times.map(|_| Ok(Outcome::Messages))
             }
         };

@@ -6,8 +6,10 @@
 //! in Particle Filters Through KLD-Sampling*, 2003, equation 12, by the Wilson-Hilferty
 //! approximation). The cells are counted on the weighted particles before resampling.
 
+use vigil_checkpoint::CheckpointValue;
+
 /// Counts occupied cells and gives the number of particles for the next step.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 pub struct Adaptive {
     error: f64,
     quantile: f64,

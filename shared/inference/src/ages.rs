@@ -16,6 +16,7 @@
 //! only. Mixtures of several gained on small faults what they lost on others.
 
 use nalgebra::SVector;
+use vigil_checkpoint::CheckpointValue;
 
 use crate::logspace::{log_add, probability};
 use crate::onsets::{Onset, Onsets};
@@ -64,7 +65,7 @@ impl WhitenedResidual<1> {
 }
 
 /// A fault that began at one of some successive steps.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 struct Component<const D: usize> {
     log_weight: f64,
     bias: SVector<f64, D>,
@@ -74,7 +75,7 @@ struct Component<const D: usize> {
 }
 
 /// Learned-bias detection filter over a whitened residual of D dimensions.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Ages<const D: usize> {
     components: Onsets<Component<D>>,
     prior_variance: f64,

@@ -3,11 +3,13 @@
 //! A mixture drawn anew for every measurement would charge the true explanation the logarithm of
 //! its share each time. Here, where explanations last, it is charged once.
 
+use vigil_checkpoint::CheckpointValue;
+
 use crate::filter::SUM_TOLERANCE;
 use crate::logspace::log_sum_exp;
 
 /// Probabilities of N explanations.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Alternatives<const N: usize> {
     p: [f64; N],
 }

@@ -5,10 +5,13 @@
 //! is bounded: improbable hypotheses are dropped, and when a mode's places are taken its least
 //! probable hypothesis gives way.
 
+use vigil_checkpoint::CheckpointValue;
+
 use crate::logspace::{log_add, log_sum_exp};
 
 /// One hypothesis: since `onset` the system is in `mode`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
+#[checkpoint(bound = "T: CheckpointValue")]
 pub struct Hypothesis<T> {
     /// Mode, a caller's index.
     pub mode: usize,
@@ -21,7 +24,8 @@ pub struct Hypothesis<T> {
 }
 
 /// A bounded set of hypotheses.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
+#[checkpoint(bound = "T: CheckpointValue")]
 pub struct Bank<T> {
     hypotheses: Vec<Hypothesis<T>>,
     scratch: Vec<f64>,

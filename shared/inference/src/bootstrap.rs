@@ -8,6 +8,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 
 use crate::adaptive::Adaptive;
 use crate::filter::{Event, Filter, Step, normalise_into};
@@ -23,10 +24,13 @@ use crate::weights::Weights;
 const COASTED_MAX: u32 = 5;
 
 /// A particle filter over the modes and states of `M`. All buffers are made once.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
+#[checkpoint(bound = "M: Checkpoint")]
+#[checkpoint(bound = "M::State: CheckpointValue")]
 pub struct ParticleFilter<M: Sampled> {
     model: M,
     proposal: Proposal,
+    #[checkpoint(fixed)]
     resampling: Resampling,
     adaptive: Option<Adaptive>,
     count_max: usize,

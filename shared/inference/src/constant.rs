@@ -8,11 +8,13 @@
 //! only chance raises an alarm. [`crate::windowed`] makes the blind spot smaller, [`crate::ages`]
 //! has none.
 
+use vigil_checkpoint::CheckpointValue;
+
 use crate::departure::LOG_ODDS_MAX;
 use crate::logspace::log_add;
 
 /// Two states, nominal and fault, with a constant likelihood in the fault state.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Constant {
     log_odds: f64,
     gain: f64,

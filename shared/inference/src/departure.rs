@@ -15,6 +15,7 @@
 //! change is a healthy hypothesis of its own. Its departure is held within the nominal bound too.
 
 use nalgebra::{Matrix3, Vector3};
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 
 use crate::angle::wrap;
 use crate::gaussian::log_density;
@@ -39,7 +40,7 @@ const CHANGE_LOSES: f64 = 5.0;
 const CHANGED: f64 = 2.0;
 
 /// A fault, its end, or a change of the ground that began at one of some successive steps.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 struct Hypothesis {
     log_weight: f64,
     /// Part of the log-weight: the log-probability that its departure is material.
@@ -61,8 +62,9 @@ pub struct Kind {
 }
 
 /// The filter, over K kinds of faults.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Checkpoint)]
 pub struct Departure<const K: usize> {
+    #[checkpoint(fixed)]
     nominal: MotionNoise,
     track: Track,
     /// Context of the nominal mode; while a fault is suspected, that from before.

@@ -46,6 +46,8 @@
 //! outlier, a context beyond its bound. Nothing is promised there, and nothing is learned of it:
 //! there are no states that follow the ground, which a proof would have to follow too.
 
+use vigil_checkpoint::CheckpointValue;
+
 pub mod level;
 pub mod path;
 pub mod repeats;
@@ -56,7 +58,7 @@ pub mod repeats;
 const HOURS_MAX: f64 = 1e8;
 
 /// One detector of the Shiryaev-Roberts kind: recurrence (2).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 pub struct EDetector {
     hours: f64,
 }

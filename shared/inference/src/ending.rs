@@ -5,6 +5,8 @@
 //! mode moves the odds of a chain whose rates bound them. So the delay with which an end is
 //! detected depends on the size of the fault, not on how long it lasted.
 
+use vigil_checkpoint::CheckpointValue;
+
 use crate::logspace::log_add;
 
 /// Largest change of the log-odds by one step, nats, so that no single measurement decides. Chosen
@@ -14,7 +16,7 @@ use crate::logspace::log_add;
 const GAIN_MAX: f64 = 5.0;
 
 /// The two-state chain.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Ending {
     appears_1_s: f64,
     vanishes_1_s: f64,

@@ -1,9 +1,10 @@
 //! The Kalman filter on a Gaussian of fixed dimension.
 
 use nalgebra::{Cholesky, SMatrix, SVector};
+use vigil_checkpoint::CheckpointValue;
 
 /// A Gaussian over N variables.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Gaussian<const N: usize> {
     /// Mean.
     pub mean: SVector<f64, N>,

@@ -22,6 +22,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 
 use crate::filter::{Event, Filter, SUM_TOLERANCE, Step};
 use crate::hybrid::{self, ModelError, Modes, Sampled};
@@ -69,12 +70,16 @@ struct Node {
 }
 
 /// The hierarchical filter over the modes and states of `M`.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
+#[checkpoint(bound = "M: Checkpoint")]
+#[checkpoint(bound = "M::State: CheckpointValue")]
 pub struct Hierarchical<M: Sampled> {
     model: M,
+    #[checkpoint(fixed)]
     nodes: Vec<Node>,
     /// Abstract nodes above each mode, from the top.
     above: Vec<Vec<usize>>,
+    #[checkpoint(fixed)]
     resampling: Resampling,
     rng: Pcg64Mcg,
     count_max: usize,

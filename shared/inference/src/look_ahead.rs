@@ -9,6 +9,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 
 use crate::filter::{Event, Filter, Step, normalise_into};
 use crate::gaussian::Gaussian;
@@ -16,14 +17,15 @@ use crate::hybrid::{self, Conditional, ModelError};
 use crate::logspace::{log_add, log_sum_exp};
 use crate::resample::systematic;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 struct Particle<const N: usize> {
     mode: usize,
     state: Gaussian<N>,
 }
 
 /// The look-ahead filter of N continuous dimensions. Particles have equal weights after each step.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
+#[checkpoint(bound = "M: Checkpoint")]
 pub struct LookAhead<M, const N: usize> {
     model: M,
     rng: Pcg64Mcg,

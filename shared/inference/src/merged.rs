@@ -5,13 +5,16 @@
 //! Bar-Shalom, *The Interacting Multiple Model Algorithm*, 1988): `μ_ij = b_i P_ij / Σ_i`, mean
 //! `m_j = Σ_i μ_ij m_i`, covariance `Σ_i μ_ij (V_i + (m_i - m_j)(m_i - m_j)ᵀ)`.
 
+use vigil_checkpoint::Checkpoint;
+
 use crate::filter::{Event, Filter, Step, is_distribution, normalise_into};
 use crate::gaussian::Gaussian;
 use crate::hybrid::{self, Conditional, ModelError};
 use crate::logspace::log_sum_exp;
 
 /// The interacting multiple model filter of N continuous dimensions.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
+#[checkpoint(bound = "M: Checkpoint")]
 pub struct Merged<M, const N: usize> {
     model: M,
     states: Vec<Gaussian<N>>,

@@ -3,6 +3,8 @@
 //! Onsets are resolved in proportion to their age: the last one or two singly, older ones in pairs,
 //! then in fours, and so on. [`Onset::merged`] makes one component of two.
 
+use vigil_checkpoint::CheckpointValue;
+
 /// Levels: a component of level j holds 2^j successive onsets, one of the last level any number.
 /// Chosen by hand: two of each of nine levels resolve 1022 onsets, 51 s at 20 observations per
 /// second; older ones share one. Fewer levels blur faults that are hard to detect; more cost time.
@@ -20,7 +22,8 @@ pub trait Onset: Copy {
 }
 
 /// The components.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
+#[checkpoint(bound = "C: CheckpointValue")]
 pub struct Onsets<C> {
     /// By level; in a level the younger first.
     components: [Option<C>; COMPONENTS],

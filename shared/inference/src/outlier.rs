@@ -4,6 +4,8 @@
 //! (the contaminated normal distribution of Tukey, 1960). An outlier under every hypothesis is
 //! evidence for none of them.
 
+use vigil_checkpoint::CheckpointValue;
+
 use crate::logspace::{log_add, log_normal, probability};
 use crate::track::Track;
 
@@ -66,7 +68,7 @@ pub fn unvouched(variance: [f64; 3]) -> [f64; 3] {
 }
 
 /// Detection of outliers in a measured pose, axis by axis (x, y, yaw).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 pub struct Trust {
     /// Outliers in a row.
     streak: [i32; 3],

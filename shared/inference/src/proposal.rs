@@ -9,11 +9,13 @@
 //! particles. Weights get the factor `r(d') / r(d)`; the reported belief is without this tilt,
 //! each weight divided by its particle's risk.
 
+use vigil_checkpoint::CheckpointValue;
+
 use crate::filter::SUM_TOLERANCE;
 use crate::hybrid::{self, ModelError, Modes};
 
 /// Tables of a proposal for a fixed set of modes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, CheckpointValue)]
 pub struct Proposal {
     modes: usize,
     /// Row d: cumulative `q(. | d)`.

@@ -7,6 +7,8 @@
 //! outside the healthy interval, posterior to prior. [`Size::log_material`] is the logarithm of the
 //! posterior's mass.
 
+use vigil_checkpoint::CheckpointValue;
+
 use libm::erfc;
 
 /// Least mass outside the healthy interval: a size that can return must not become impossible.
@@ -27,7 +29,7 @@ pub struct Prior {
 }
 
 /// Gaussian belief about a size and an offset beside it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Size {
     mean: [f64; 2],
     /// Variance of the size, covariance, variance of the offset.

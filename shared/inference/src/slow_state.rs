@@ -4,8 +4,10 @@
 //! An Ornstein-Uhlenbeck process, estimated by a scalar Kalman filter. Its mean saturates at the
 //! tolerance, so that a larger lasting offset is never learned away.
 
+use vigil_checkpoint::CheckpointValue;
+
 /// Bounds of a slow state.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Drift {
     /// Largest healthy magnitude: twice the stationary deviation.
     pub tolerance: f64,
@@ -22,7 +24,7 @@ impl Drift {
 }
 
 /// The estimate.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 pub struct SlowState {
     /// Mean.
     pub mean: f64,

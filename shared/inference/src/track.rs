@@ -8,6 +8,7 @@
 //! filter linearises about the heading at half the turn.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use vigil_checkpoint::CheckpointValue;
 
 use crate::angle::wrap;
 use crate::gaussian::{Gaussian, log_density};
@@ -37,7 +38,7 @@ pub struct MotionNoise {
 
 /// Estimated deviations per metre of a healthy robot where it drives: slip, slope, the offset of a
 /// servo. A fault adds to them.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Context {
     /// Mean; order yaw, forward, lateral.
     pub mean: Vector3<f64>,
@@ -127,7 +128,7 @@ fn reverse<const D: usize>(
 }
 
 /// One displacement.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Displacement {
     /// Expected yaw, forward, lateral displacement per commanded metre.
     pub per_metre: [f64; 3],
@@ -138,7 +139,7 @@ pub struct Displacement {
 }
 
 /// The track.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Track {
     mean: SVector<f64, N>,
     covariance: SMatrix<f64, N, N>,

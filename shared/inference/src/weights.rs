@@ -1,9 +1,11 @@
 //! Weights of particles, kept as normalised logarithms.
 
+use vigil_checkpoint::CheckpointValue;
+
 use crate::filter::is_distribution;
 
 /// Normalised weights: the logarithms and their exponentials.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, CheckpointValue)]
 pub(crate) struct Weights {
     log: Vec<f64>,
     linear: Vec<f64>,

@@ -7,11 +7,12 @@
 //! evidence: a step adds `(|r_W|² - τ²) / 2W`.
 
 use nalgebra::SVector;
+use vigil_checkpoint::CheckpointValue;
 
 use crate::constant::Constant;
 
 /// Two states with a constant likelihood over windows of W whitened residuals of D dimensions.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Windowed<const D: usize, const W: usize> {
     /// The last residuals, by step modulo W.
     residuals: [SVector<f64, D>; W],

@@ -88,6 +88,17 @@ impl Tracker {
         self.accept(self.next.sum()).is_some()
     }
 
+    /// Gives away the belief as numbers, to go on from it later to the last bit: the order in which
+    /// states are summed is part of it.
+    pub fn keep(&self, put: &mut dyn FnMut(f64)) {
+        self.belief.keep(put);
+    }
+
+    /// Goes on from what [`Self::keep`] gave away for the same model.
+    pub fn resume(&mut self, take: &mut dyn FnMut() -> f64) {
+        self.belief.resume(take);
+    }
+
     /// b'(s') = sum_s T(s,a,s') b(s), normalised.
     pub fn predict(&mut self, model: &Pomdp, action: usize) {
         for &s in self.belief.support() {

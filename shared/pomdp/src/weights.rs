@@ -78,6 +78,28 @@ impl Weights {
         }
     }
 
+    /// Gives away how many values are not 0, then their indices and values, in the order of the
+    /// support.
+    pub(crate) fn keep(&self, put: &mut dyn FnMut(f64)) {
+        put(self.count as f64);
+        for &index in self.support() {
+            put(f64::from(index));
+            put(self.at(index));
+        }
+    }
+
+    /// Takes what [`Self::keep`] gave away; what cannot be is left out.
+    pub(crate) fn resume(&mut self, take: &mut dyn FnMut() -> f64) {
+        self.clear();
+        let count = (take() as usize).min(self.values.len());
+        for _ in 0..count {
+            let (index, value) = (take() as usize, take());
+            if index < self.values.len() && self.values[index] == 0.0 {
+                self.add(index as u32, value);
+            }
+        }
+    }
+
     /// Takes all of `other`, times `factor`; `other` is 0 afterwards. `self` must be 0.
     pub(crate) fn take_scaled(&mut self, other: &mut Self, factor: f64) {
         for &index in &other.list[..other.count] {

@@ -1,5 +1,7 @@
 //! The alarm: at which log-odds it rises, and when it falls again.
 
+use vigil_checkpoint::CheckpointValue;
+
 use crate::model_file::ModelError;
 
 /// Distance below the threshold at which an alarm falls, nats. Chosen: a factor of 150 on the odds;
@@ -14,7 +16,7 @@ const CLEAR_S: f64 = 1.0;
 const TIME_SLACK_S: f64 = 1e-6;
 
 /// An alarm that rises above a threshold and falls once the log-odds have been low for a second.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Alarm {
     threshold_log_odds: f64,
     stands: bool,

@@ -5,6 +5,8 @@
 //! of motion at most. After that the identifier decides, until its p(nominal) falls or the detector
 //! raises another alarm.
 
+use vigil_checkpoint::CheckpointValue;
+
 /// Probability of nominal above which a diagnosis contradicts an alarm. Even odds: a lower bound
 /// would end alarms that the identifier itself holds for likely.
 pub const NOMINAL: f64 = 0.5;
@@ -43,7 +45,7 @@ pub struct StageBeliefs {
 
 /// Fuses the detector's alarm with the identifier's diagnosis. Of one stage alone, use
 /// [`crate::alarm::Alarm`].
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 pub struct FusedAlarm {
     stands: bool,
     t_ns: u64,

@@ -1,5 +1,7 @@
 //! The period of a sensor's frames, from their capture times.
 
+use vigil_checkpoint::CheckpointValue;
+
 /// Intervals remembered. Chosen: the low third stands on ten of them, so that lost frames and
 /// bursts among the others do not move it; more remember an old rate for longer.
 const MEMORY: usize = 31;
@@ -14,7 +16,7 @@ const DOUBLE: f64 = 0.2;
 /// it while a third comes in time: the noise of a sample depends on the sensor, not on the gap
 /// before it. Jitter makes the period too short and the samples seem noisier, which the estimate of
 /// the noise corrects.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 pub struct FramePeriod {
     recent_ns: [u64; MEMORY],
     count: usize,

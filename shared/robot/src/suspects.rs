@@ -1,12 +1,13 @@
 //! Channels in which a fault is suspected.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 
 use crate::slot::{SLOTS, Slot};
 
 /// While an alarm stands, the channels that show a fault with odds above even. Nothing is learned
 /// from them: their measurements are not those of a healthy robot. Empty without an alarm.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, CheckpointValue)]
 pub struct Suspects(u64);
 
 const _: () = assert!(SLOTS <= u64::BITS as usize);

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::slow_state::Drift;
 use vigil_inference::track::MotionNoise;
 
@@ -17,7 +18,7 @@ const SUDDEN_SHARE: f64 = 0.1;
 
 /// Healthy variation, in physical units. Each value is the largest magnitude that is no fault. The
 /// filters estimate the variation up to it; what is beyond is a material departure.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema, CheckpointValue)]
 #[serde(deny_unknown_fields)]
 pub struct Tolerance {
     /// Yaw per metre travelled beside that of the model, rad/m.
@@ -47,7 +48,7 @@ pub struct Tolerance {
 }
 
 /// Healthy variation of gyro and currents.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema, CheckpointValue)]
 #[serde(deny_unknown_fields)]
 pub struct FurtherTolerance {
     /// Bias of the gyro, rad/s.

@@ -1,8 +1,8 @@
 //! Blocks that topics carry.
 
 use vigil_blocks::{
-    Action, Block, Control, DetectionBelief, FaultBelief, Faults, Health, ParticleBlock,
-    SensorFrame, Truth,
+    Action, Block, CheckpointPart, Control, DetectionBelief, FaultBelief, Faults, Health, Journal,
+    ParticleBlock, SensorFrame, Truth,
 };
 
 use super::{Link, Receiver, Sender};
@@ -49,11 +49,13 @@ macro_rules! carried {
 
 carried!(
     Action,
+    CheckpointPart,
     Control,
     DetectionBelief,
     FaultBelief,
     Faults,
     Health,
+    Journal,
     ParticleBlock,
     SensorFrame,
     Truth,

@@ -13,6 +13,7 @@
 //! frame is one of its causes.
 
 use vigil_blocks::{Blindness, SensorFrame};
+use vigil_checkpoint::CheckpointValue;
 
 /// Without a valid frame for so long, s, the detector is blind. As long as an alarm takes to clear
 /// (`alarm::CLEAR_S`).
@@ -37,7 +38,7 @@ const SHORT_RUNS: u32 = 3;
 const RATE_MAX: f64 = 2.0;
 
 /// What the next frame is compared with.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 struct Last {
     epoch: u64,
     run_id: u64,
@@ -46,7 +47,7 @@ struct Last {
 }
 
 /// Counts the time without valid frames of one graph.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 pub struct BlindnessTimer {
     /// Bits of which a frame needs any, and of which it needs all.
     channels: u64,

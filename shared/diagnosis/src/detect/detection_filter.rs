@@ -1,6 +1,7 @@
 //! Observer and detection filter: of the rover's model, or of a model of channels.
 
 use vigil_blocks::SensorFrame;
+use vigil_checkpoint::Checkpoint;
 use vigil_robot::channel_model::context_change::ChangeWatch;
 use vigil_robot::learned::monitor::DetectionOutput;
 use vigil_robot::learned::{FrameOutcome, Healthy, Monitor, NoiseScales, Observation, Observer};
@@ -29,7 +30,7 @@ impl From<&Observation> for Interval {
 
 /// Observer and detection filter of either model. The models share no observation, so that no
 /// trait covers both.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub(crate) enum DetectionFilter {
     /// Of a model with faults: tracks the pose.
     Faults {

@@ -4,6 +4,7 @@ use vigil_blocks::{
     DetectionBelief, Entry, HealthyBelief, MODE_UNKNOWN, ParticleBlock, Readiness, SensorFrame,
     Symptoms, WeightedHypothesis,
 };
+use vigil_checkpoint::Checkpoint;
 use vigil_inference::ending::Ending;
 use vigil_inference::logspace::{log_add, log_sum_exp, probability};
 use vigil_robot::channel_model;
@@ -46,11 +47,12 @@ pub enum DetectorError {
 ///
 /// A step that completes an observation (about every learned interval, 50 ms) updates the belief;
 /// the steps between repeat it. Equal entries give bit-identical beliefs.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Detector {
     filter: DetectionFilter,
     fault_rate_1_s: f64,
     alarm: Alarm,
+    #[checkpoint(fixed)]
     map: ChannelMap,
     /// While an alarm stands: of each channel, whether its fault is still there.
     endings: [Ending; SLOTS],
@@ -61,6 +63,7 @@ pub struct Detector {
     moving: bool,
     blindness: BlindnessTimer,
     /// With a live publisher.
+    #[checkpoint(each)]
     publisher: Option<Publisher>,
     period_s: f64,
     t_last_ns: u64,
@@ -71,6 +74,7 @@ pub struct Detector {
     symptoms: u32,
     external: u32,
     /// In a graph with a planned path: symptoms come from these, not from the pose's log-odds.
+    #[checkpoint(each)]
     monitors: Option<Monitors>,
     /// Last action that the robot carried out, and its outcome, as the last frame says.
     action_seq: u64,

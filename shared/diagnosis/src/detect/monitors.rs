@@ -20,6 +20,7 @@
 //! fires, and the first one after a silence begins everything anew.
 
 use vigil_blocks::{SensorFrame, Symptoms};
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_inference::angle::wrap;
 use vigil_robot::ChannelMap;
 
@@ -44,7 +45,7 @@ const PLACES: usize = 128;
 const POSE_MAX: f64 = 1e7;
 
 /// A place that the robot has passed.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 struct Place {
     at: [f64; 2],
     planned: [f64; 2],
@@ -52,9 +53,11 @@ struct Place {
 }
 
 /// The four monitors. Allocates nothing after the start.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Monitors {
+    #[checkpoint(fixed)]
     map: ChannelMap,
+    #[checkpoint(fixed)]
     settings: MonitorSettings,
     places: Vec<Place>,
     trace: Option<Trace>,
@@ -62,7 +65,7 @@ pub struct Monitors {
 }
 
 /// What carries over from frame to frame.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 struct Trace {
     reset_count: u32,
     yaw: [f64; 2],
@@ -80,7 +83,7 @@ struct Trace {
 }
 
 /// Turning on the spot.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 struct Spin {
     /// Where turning is counted from.
     from: [f64; 2],

@@ -1,5 +1,6 @@
 //! Whether frames come when they are due.
 
+use vigil_checkpoint::CheckpointValue;
 use vigil_robot::publisher_check::{Finding, FindingKind};
 
 /// Length of a window, s, and windows in a row that must agree on a finding. A window is as long as
@@ -18,7 +19,7 @@ const RATE_MAX: f64 = 1.5;
 const GAP_PERIODS: f64 = 6.0;
 
 /// Counts frames and missed deadlines by the journal.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 pub(crate) struct Pace {
     period_s: f64,
     frames: u32,

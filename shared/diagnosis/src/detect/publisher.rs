@@ -1,13 +1,14 @@
 //! Tests of a live publisher: whether its frames come when they are due, and mean what they should.
 
 use vigil_blocks::SensorFrame;
+use vigil_checkpoint::Checkpoint;
 use vigil_robot::Description;
 use vigil_robot::publisher_check::{Finding, PublisherCheck};
 
 use crate::detect::pace::Pace;
 
 /// The tests of a live publisher.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub(crate) struct Publisher {
     meaning: PublisherCheck,
     pace: Pace,

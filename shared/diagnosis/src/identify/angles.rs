@@ -2,12 +2,13 @@
 //! anything.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::alternative::Alternatives;
 use vigil_robot::learned::SteerReading;
 use vigil_robot::learned::steer_reading::ANYTHING;
 
 /// Of each steered wheel: as commanded, or anything.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Angles([Alternatives<2>; WHEELS]);
 
 impl Default for Angles {

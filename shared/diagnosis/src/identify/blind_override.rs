@@ -1,9 +1,10 @@
 //! While the detector is blind, no diagnosis is made: its names say BLIND.
 
 use vigil_blocks::{DetectionBelief, FaultBelief, MODE_BLIND};
+use vigil_checkpoint::CheckpointValue;
 
 /// Puts [`MODE_BLIND`] over the names that a filter reports. The probabilities stay the filter's.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 pub(crate) struct BlindOverride {
     is_blind: bool,
     mode: u32,

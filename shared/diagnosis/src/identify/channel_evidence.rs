@@ -6,6 +6,7 @@
 //! moment ago and shares its past.
 
 use vigil_blocks::{EVIDENCE, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_inference::alternative::Alternatives;
 use vigil_inference::logspace::log_add;
 use vigil_inference::outlier::unvouched;
@@ -39,7 +40,7 @@ enum Explanation {
 }
 
 /// An explanation that is taken to be true since the onset.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 struct FollowedExplanation {
     /// Index of the motion mode.
     mode: usize,
@@ -67,13 +68,18 @@ pub struct Drive {
 }
 
 /// The diagnosis and its rival.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct ChannelEvidence {
+    #[checkpoint(fixed)]
     model: Model,
+    #[checkpoint(fixed)]
     robot: Description,
+    #[checkpoint(fixed)]
     map: ChannelMap,
+    #[checkpoint(fixed)]
     modes: Vec<MotionMode>,
     use_wheels: bool,
+    #[checkpoint(fixed)]
     servo: ServoPrior,
     /// Of the wheels, from before the onset.
     wheels: WheelContext,

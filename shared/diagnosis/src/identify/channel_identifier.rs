@@ -4,6 +4,7 @@ use vigil_blocks::{
     DetectionBelief, Entry, FAULT_NODES, FaultBelief, FaultSet, MODE_UNKNOWN, ParticleBlock,
     Readiness,
 };
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_robot::channel_model::belief::{ComponentBelief, PairBelief};
 use vigil_robot::channel_model::{Model, Monitor, Observer, components};
 use vigil_robot::{ChannelMap, Description, FaultTree};
@@ -20,7 +21,7 @@ use crate::sensors::Sensors;
 const TELLING_LOG_ODDS: f64 = 0.0;
 
 /// What is believed of the components, given that something is wrong.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 struct Verdict {
     /// Probability of each node's leaf alone.
     leaves: [f64; FAULT_NODES],
@@ -49,13 +50,16 @@ const NO_VERDICT: Verdict = Verdict {
 };
 
 /// Divides the detector's probability of a fault among the components of the robot.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct ChannelIdentifier {
     observer: Observer,
     monitor: Monitor,
+    #[checkpoint(fixed)]
     map: ChannelMap,
     /// Leaf of each component; none for what the tree does not name: it is unknown.
+    #[checkpoint(fixed)]
     leaf: Vec<Option<usize>>,
+    #[checkpoint(fixed)]
     leaves: LeafMap,
     verdict: Verdict,
     posterior: TreeBelief,

@@ -1,6 +1,7 @@
 //! By how much an encoder is late: a probability for each of some delays.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 use vigil_robot::learned::past_rates::{DELAYS_S, PastRates, Rates};
 use vigil_robot::learned::wheels::ExpectedRate;
 
@@ -11,7 +12,7 @@ const CHANGES: f64 = 1e-5;
 const EVEN: f64 = 1.0 / DELAYS_S.len() as f64;
 
 /// Probabilities of the delays, and the rates that the wheels had.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 pub struct DelayBelief {
     p: [[f64; DELAYS_S.len()]; WHEELS],
     rates: PastRates,

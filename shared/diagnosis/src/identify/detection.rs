@@ -1,11 +1,12 @@
 //! What the identifier takes of the detector's belief.
 
 use vigil_blocks::DetectionBelief;
+use vigil_checkpoint::CheckpointValue;
 use vigil_robot::learned::{NoiseScales, OutlierRates};
 use vigil_robot::{ChannelMap, Suspects};
 
 /// The last detection.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 pub struct Detection {
     /// Whether the alarm stands.
     pub alarm: bool,

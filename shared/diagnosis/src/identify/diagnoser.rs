@@ -1,6 +1,7 @@
 //! The identifier's step: an identifier of either kind, under the detector's blindness.
 
 use vigil_blocks::{DetectionBelief, Entry, FaultBelief, ParticleBlock};
+use vigil_checkpoint::Checkpoint;
 
 use crate::identify::blind_override::BlindOverride;
 use crate::identify::channel_identifier::ChannelIdentifier;
@@ -8,13 +9,13 @@ use crate::identify::identifier::{Identifier, Input};
 use crate::invariants;
 
 /// An identifier of either kind; while the detector is blind, its names are BLIND.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Diagnoser {
     identifier: EitherIdentifier,
     blind: BlindOverride,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 enum EitherIdentifier {
     /// Over the faults that the rover's model knows.
     Faults(Box<Identifier>),

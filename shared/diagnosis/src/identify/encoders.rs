@@ -4,6 +4,7 @@
 //! encoders costs no more than one.
 
 use vigil_blocks::{SizeKind, WHEELS};
+use vigil_checkpoint::CheckpointValue;
 use vigil_robot::learned::steer_reading::ANYTHING;
 use vigil_robot::learned::wheel_evidence::{BREAKAGE_SHARES, BREAKAGES};
 
@@ -86,7 +87,7 @@ pub const BIRTH_MAX: f64 = {
 };
 
 /// Log-likelihoods of one observation's readings in each state, prepared for many hypotheses.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Likelihoods {
     logs: [[f64; STATES]; WHEELS],
     /// Relative to the largest of a wheel, which is 1.
@@ -148,7 +149,7 @@ impl Likelihoods {
 }
 
 /// Probabilities of the encoders' states.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Encoders {
     p: [[f64; STATES]; WHEELS],
     onset: [u64; WHEELS],

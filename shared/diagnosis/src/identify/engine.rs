@@ -1,5 +1,6 @@
 //! The filter that an identification runs on.
 
+use vigil_checkpoint::Checkpoint;
 use vigil_robot::learned::{Healthy, NoiseScales, Observation};
 
 use crate::identify::further::Fusion;
@@ -11,7 +12,7 @@ use crate::identify::single_fault::SingleFaultFilter;
 use crate::identify::tree_belief::TreeBelief;
 
 /// The multiple-hypothesis filter over sets of faults, or one of the library's over single faults.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub enum Engine {
     /// Sets of faults.
     MultipleHypothesis(Box<MultipleHypothesis>),

@@ -9,6 +9,7 @@
 //! each makes of the currents.
 
 use vigil_blocks::{FaultBelief, SizeKind, WHEELS};
+use vigil_checkpoint::Checkpoint;
 use vigil_inference::logspace::log_add;
 use vigil_robot::learned::current_effects::{CurrentEffects, SHARES, STUCK};
 use vigil_robot::learned::further_watch::{FurtherWatch, Residual, Residuals, Turn};
@@ -100,11 +101,14 @@ impl Wide {
 }
 
 /// The filter.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct FurtherFilter {
     watch: FurtherWatch,
+    #[checkpoint(fixed)]
     rates: FaultPrior,
+    #[checkpoint(fixed)]
     wide: Wide,
+    #[checkpoint(fixed)]
     effects: Option<CurrentEffects>,
     states: Vec<FurtherState>,
     /// Share of the births that each state has.

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use vigil_blocks::FaultBelief;
+use vigil_checkpoint::Checkpoint;
 use vigil_robot::learned::further_watch::Residuals;
 use vigil_robot::learned::{Further, Healthy, Model, Observation};
 use vigil_robot::{Description, Suspects};
@@ -14,9 +15,11 @@ use crate::identify::settings::{IdentifierFilter, Settings};
 use crate::sensors::Sensors;
 
 /// The filter, and what each observation of the identifier's ring holds.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct FurtherStage {
+    #[checkpoint(fixed)]
     model: Model,
+    #[checkpoint(fixed)]
     robot: Description,
     filter: FurtherFilter,
     ring: VecDeque<(Further, Option<Residuals>)>,

@@ -1,11 +1,12 @@
 //! What gyro and currents may show.
 
 use vigil_blocks::{SizeKind, WHEELS};
+use vigil_checkpoint::CheckpointValue;
 use vigil_robot::learned::Further;
 use vigil_robot::learned::current_effects::SHARES;
 
 /// What may be wrong.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub(crate) enum FurtherState {
     Whole,
     /// A motor: wheel, index of the share lost.

@@ -4,6 +4,7 @@ use vigil_blocks::{
     HealthyBelief, MODE_MULTIPLE, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock, WHEELS,
     WeightedHypothesis,
 };
+use vigil_checkpoint::CheckpointValue;
 use vigil_robot::learned::{Mover, triangle};
 
 use crate::identify::encoders::Encoders;
@@ -16,7 +17,7 @@ use crate::identify::set_probabilities::NEGLIGIBLE;
 const ROOM: usize = 2 * PARTICLE_CAPACITY;
 
 /// Collects hypotheses; where there are more than a block holds, the most probable.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 pub struct HypothesisList {
     all: Vec<WeightedHypothesis>,
     /// Weight and place of each, to be sorted.

@@ -1,5 +1,6 @@
 //! What a hypothesis of the multiple-hypothesis filter knows.
 
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::track::Track;
 
 use crate::identify::angles::Angles;
@@ -19,7 +20,7 @@ const THROWN_ON: f64 = 0.6;
 const THROW_SD: [f64; 3] = [0.02, 0.02, 0.1];
 
 /// Continuous state of a hypothesis, and what its encoders do.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 pub struct HypothesisState {
     /// Pose and deviations.
     pub track: Track,

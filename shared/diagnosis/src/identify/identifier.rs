@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use vigil_blocks::{
     DetectionBelief, Entry, FaultBelief, HealthyBelief, MODE_UNKNOWN, ParticleBlock, SensorFrame,
 };
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_robot::FaultPrior;
 use vigil_robot::learned::{Healthy, Observer, motion_modes};
 
@@ -47,7 +48,7 @@ pub struct Input<'a> {
 }
 
 /// What the identifier is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, CheckpointValue)]
 enum Phase {
     /// No alarm, no fault believed.
     Watching,
@@ -64,14 +65,16 @@ enum Phase {
 /// 0.1 s, a bounded number of observations per cycle; until then the report stays what it was. Then
 /// every observation is one update; cycles between observations repeat the belief, with predicted
 /// and present probability equal.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Identifier {
+    #[checkpoint(fixed)]
     leaves: LeafMap,
     engine: Engine,
     observer: Observer,
     /// What is known of a healthy robot as long as the detector publishes nothing of it.
     unsure: Healthy,
     p_unknown: f64,
+    #[checkpoint(fixed)]
     prior: FaultPrior,
     use_wheels: bool,
     /// Sensors are silent, or the robot moves though it should stand: nothing can be identified.
@@ -88,6 +91,7 @@ pub struct Identifier {
     interval_s: f64,
     phase: Phase,
     /// Gyro and currents, where they take part: a filter, and what the ring's observations hold.
+    #[checkpoint(each)]
     further: Option<Box<FurtherStage>>,
     detection: Detection,
     posterior: TreeBelief,

@@ -13,6 +13,7 @@
 mod changes;
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::Checkpoint;
 use vigil_inference::bank::{Bank, Hypothesis};
 use vigil_inference::outlier::{Trust, unvouched};
 use vigil_inference::track::Context;
@@ -47,13 +48,18 @@ const PER_RARE: usize = 8;
 const FLOOR: f64 = -30.0;
 
 /// The filter.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct MultipleHypothesis {
+    #[checkpoint(fixed)]
     model: Model,
+    #[checkpoint(fixed)]
     robot: Description,
+    #[checkpoint(fixed)]
     leaves: LeafMap,
     use_wheels: bool,
+    #[checkpoint(fixed)]
     modes: Vec<MotionMode>,
+    #[checkpoint(fixed)]
     rates: FaultRates,
     /// Of each wheel's encoder.
     births_1_s: [f64; WHEELS],
@@ -62,6 +68,7 @@ pub struct MultipleHypothesis {
     context: Context,
     wheels: WheelContext,
     sizes: Sizes,
+    #[checkpoint(fixed)]
     servo: ServoPrior,
     trust: Trust,
     /// Of each mode that a hypothesis is in: the log-likelihoods of the last observation's wheels.

@@ -1,6 +1,7 @@
 //! In which way the component of each node is broken, and by how much.
 
 use vigil_blocks::{FAULT_NODES, FaultBelief, SizeKind, WHEELS};
+use vigil_checkpoint::CheckpointValue;
 use vigil_robot::learned::{MotionMode, Mover};
 
 use crate::identify::encoders::{STATES, WAYS_TO_BREAK};
@@ -9,7 +10,7 @@ use crate::identify::multiple_hypothesis::MultipleHypothesis;
 use crate::identify::tree_belief::{SIZE_P_MIN, TreeBelief};
 
 /// Kind and size of each node's fault.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct NodeSizes {
     size: [f64; FAULT_NODES],
     sd: [f64; FAULT_NODES],

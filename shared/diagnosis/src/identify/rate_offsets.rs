@@ -6,6 +6,7 @@
 //! beside a dead encoder would lose to a pair that learns.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 use vigil_robot::learned::wheel_context::FAR_SD;
 use vigil_robot::learned::wheel_evidence::{DRAG_SD, WheelDrag};
 use vigil_robot::learned::{Model, Observation, WheelEvidence};
@@ -16,7 +17,7 @@ const DRIFT_SD: f64 = 0.01;
 
 /// Gaussian beliefs about the offsets in units of [`WheelDrag::unit_rad_s`], one per wheel: a
 /// scalar Kalman filter each. Relative, as the change follows the command.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct RateOffsets {
     mean: [f64; WHEELS],
     variance: [f64; WHEELS],

@@ -1,6 +1,7 @@
 //! The reported fault: the memoryless name, `mode`, with hysteresis.
 
 use vigil_blocks::{MODE_MULTIPLE, MODE_UNKNOWN};
+use vigil_checkpoint::CheckpointValue;
 use vigil_robot::fused_alarm;
 
 use crate::identify::leaf_map::LeafMap;
@@ -14,7 +15,7 @@ const HELD_MIN: f64 = 0.3;
 const SLACK_S: f64 = 1e-6;
 
 /// The name that is held: index of a node, [`MODE_UNKNOWN`] or [`MODE_MULTIPLE`].
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, CheckpointValue)]
 pub struct ReportedFault {
     held: u32,
     changes: u32,

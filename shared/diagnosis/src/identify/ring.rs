@@ -2,12 +2,13 @@
 
 use std::collections::VecDeque;
 
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_robot::learned::{Healthy, NoiseScales, Observation};
 
 use crate::invariants::{self, RingPlace};
 
 /// An observation kept for an identification, and what the detector believed after it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 pub(crate) struct RingEntry {
     /// The run that it belongs to.
     pub run_id: u64,
@@ -30,7 +31,7 @@ impl RingEntry {
 }
 
 /// The ring: full, it gives up its oldest entry for a new one. Allocates once.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub(crate) struct Ring {
     entries: VecDeque<RingEntry>,
     capacity: usize,

@@ -6,6 +6,7 @@
 //! the likelihood of a reading integrates over it; which of the two it is, is one more Bayes step.
 
 use vigil_blocks::SizeKind;
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::logspace::{log_add, probability};
 use vigil_inference::size::{Prior, Size};
 use vigil_robot::Description;
@@ -19,7 +20,7 @@ const UNDECLARED_RAD: f64 = 0.01;
 const WANDERS: f64 = 0.02;
 
 /// What is believed of one servo.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct ServoFault {
     /// Angle off the commanded one, rad: beyond the tolerance.
     offset: Size,

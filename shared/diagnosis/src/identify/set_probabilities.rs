@@ -1,6 +1,7 @@
 //! Probabilities of all sets of faults, from hypotheses about motion and encoders.
 
 use vigil_blocks::{FaultSet, WHEELS};
+use vigil_checkpoint::CheckpointValue;
 use vigil_robot::learned::{MotionMode, Mover};
 
 use crate::identify::further::Fusion;
@@ -15,7 +16,7 @@ const POSE: usize = WHEELS;
 pub const FLOOR: f64 = 1e-12;
 
 /// Sums over hypotheses.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 pub struct SetProbabilities {
     /// Row s: the wheels `s` (bits) are stuck; after these rows one per wheel whose steering servo
     /// does not do as it is told, and one for a pose that has jumped. Column e: the encoders `e`

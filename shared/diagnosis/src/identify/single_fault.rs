@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use vigil_blocks::{FaultSet, MODE_UNKNOWN, WHEELS, WeightedHypothesis};
+use vigil_checkpoint::Checkpoint;
 use vigil_inference::adaptive::Adaptive;
 use vigil_inference::bootstrap::ParticleFilter;
 use vigil_inference::filter::Filter;
@@ -46,7 +47,7 @@ const PARTICLES_MIN: usize = 32;
 const ONSET: f64 = 0.1;
 
 /// A filter and its model.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 enum LibraryFilter {
     Sampled(ParticleFilter<Switching>),
     Hierarchical(Hierarchical<Switching>),
@@ -62,9 +63,10 @@ enum ModeNode {
 }
 
 /// A filter over nominal, single faults and the unknown.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct SingleFaultFilter {
     kind: LibraryFilter,
+    #[checkpoint(fixed)]
     nodes_of_modes: Vec<ModeNode>,
     use_wheels: bool,
     seed: u64,

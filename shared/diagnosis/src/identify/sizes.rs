@@ -7,6 +7,7 @@
 //! of its own, and what a healthy encoder read before it is forgotten at the first faulty reading.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::Checkpoint;
 use vigil_inference::logspace::log_add;
 use vigil_inference::size::{Prior, Size};
 use vigil_robot::learned::wheel_context::FAR_SD;
@@ -61,9 +62,10 @@ pub struct EncoderSizes {
 }
 
 /// The estimates.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Sizes {
     /// Of gain, bias and drift.
+    #[checkpoint(fixed)]
     priors: [Prior; DELAY],
     fresh: [Size; DELAY],
     held: [[Size; DELAY]; WHEELS],

@@ -1,6 +1,7 @@
 //! What is believed about the faults, in the words of the fault tree.
 
 use vigil_blocks::{FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_MULTIPLE, MODE_UNKNOWN};
+use vigil_checkpoint::CheckpointValue;
 
 use crate::identify::leaf_map::LeafMap;
 
@@ -9,7 +10,7 @@ use crate::identify::leaf_map::LeafMap;
 pub const SIZE_P_MIN: f64 = 0.01;
 
 /// Probabilities of nodes, sets of leaves and the unknown.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct TreeBelief {
     /// Of the nominal mode, of each leaf's fault (alone or with others), and of any fault below
     /// each abstract node.

@@ -1,6 +1,7 @@
 //! Log-likelihoods of one observation's wheels in one motion mode, once for all hypotheses.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 use vigil_robot::Description;
 use vigil_robot::learned::wheel_evidence::WheelDrag;
 use vigil_robot::learned::{Model, MotionMode, Mover, Observation, WheelEvidence};
@@ -13,7 +14,7 @@ use crate::identify::sized_ways::{BIAS, DRIFT};
 use crate::identify::sizes::EncoderSizes;
 
 /// Of one motion mode.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 pub struct WheelTerms {
     /// In general, and at the mode's onset.
     likelihoods: [Likelihoods; 2],

@@ -27,6 +27,8 @@
 //!
 //! has mean 1 or less, as `E exp(γ e² / s²) <= 1 / √(1 - 2γ)` for e sub-Gaussian with s.
 
+use vigil_checkpoint::CheckpointValue;
+
 use super::EDetector;
 
 /// Tilts θ, in deviations of the noise: shifts beyond the bound that are looked for. A shift
@@ -41,7 +43,7 @@ const LOG_E_MAX: f64 = 8.0;
 const COUNT: usize = 2 * TILTS.len() + 1;
 
 /// A reading, and what is declared of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct LevelReading {
     /// Reading less prediction, in the channel's unit.
     pub residual: f64,
@@ -109,7 +111,7 @@ fn context(rho: f64, before: f64, now: &LevelReading) -> f64 {
 }
 
 /// The detectors of one channel.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Level {
     correlation: [f64; 2],
     before: Option<LevelReading>,

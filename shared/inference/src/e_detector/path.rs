@@ -38,6 +38,8 @@
 //!   one that lacks a reading for reasons that know nothing of the noise is free, [`Path::skip`];
 //! - h, known when the block begins, is the time that has passed until then.
 
+use vigil_checkpoint::CheckpointValue;
+
 use super::EDetector;
 
 /// Largest noise of a reading in its deviations. By chance a Gaussian exceeds it once in 1.7
@@ -65,7 +67,7 @@ pub struct PathReading {
 }
 
 /// A block under way.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 struct Block {
     k: u32,
     /// Noise by which λ was fixed.
@@ -106,7 +108,7 @@ impl Slope {
 }
 
 /// The detectors of one channel, for blocks of one length.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Path {
     steps: u32,
     correlation: f64,

@@ -115,6 +115,28 @@ impl Decider {
     pub fn reset(&mut self) {
         self.policy.reset();
     }
+
+    /// Gives away the last decision, and what the policy remembers, as numbers.
+    pub fn keep(&self, put: &mut dyn FnMut(f64)) {
+        self.values.iter().for_each(|value| put(*value));
+        self.votes.keep(put);
+        put(self.action_entropy);
+        put(f64::from(self.measure as u8));
+        self.policy.keep(put);
+    }
+
+    /// Goes on from what [`Self::keep`] gave away under the same model and policy.
+    pub fn resume(&mut self, take: &mut dyn FnMut() -> f64) {
+        self.values.iter_mut().for_each(|value| *value = take());
+        self.votes.resume(take);
+        self.action_entropy = take();
+        self.measure = match take() as u8 {
+            0 => Measure::Value,
+            1 => Measure::Votes,
+            _ => Measure::Entropy,
+        };
+        self.policy.resume(take);
+    }
 }
 
 #[cfg(test)]

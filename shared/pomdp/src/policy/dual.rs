@@ -211,4 +211,17 @@ impl Policy for DualControl {
         self.run = Run::default();
         self.policy.reset();
     }
+
+    fn keep(&self, put: &mut dyn FnMut(f64)) {
+        // No entropy is infinite.
+        put(self.run.least.unwrap_or(f64::INFINITY));
+        put(f64::from(self.run.stalled));
+        self.policy.keep(put);
+    }
+
+    fn resume(&mut self, take: &mut dyn FnMut() -> f64) {
+        self.run.least = Some(take()).filter(|least| least.is_finite());
+        self.run.stalled = take() as u32;
+        self.policy.resume(take);
+    }
 }

@@ -101,6 +101,12 @@ pub trait Policy: Send {
 
     /// Forgets what it remembers of earlier decisions: a new mission begins.
     fn reset(&mut self) {}
+
+    /// Gives away what it remembers as numbers. Most policies remember nothing.
+    fn keep(&self, _put: &mut dyn FnMut(f64)) {}
+
+    /// Goes on from what [`Policy::keep`] gave away under the same model and settings.
+    fn resume(&mut self, _take: &mut dyn FnMut() -> f64) {}
 }
 
 /// Values within this much of the largest, relative to it (at least to 1), are a tie. Chosen by

@@ -50,6 +50,16 @@ impl Votes {
         &self.mass
     }
 
+    /// Gives away the votes that were counted last.
+    pub(super) fn keep(&self, put: &mut dyn FnMut(f64)) {
+        self.mass.iter().for_each(|mass| put(*mass));
+    }
+
+    /// Takes what [`Self::keep`] gave away.
+    pub(super) fn resume(&mut self, take: &mut dyn FnMut() -> f64) {
+        self.mass.iter_mut().for_each(|mass| *mass = take());
+    }
+
     /// Entropy of the votes that were counted last, 0 to 1.
     #[must_use]
     pub fn entropy(&self) -> f64 {

@@ -2,6 +2,7 @@
 
 mod drives;
 
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_inference::logspace::log_sum_exp;
 
 use super::component::Target;
@@ -42,7 +43,7 @@ pub const UNKNOWN: f64 = 2.0;
 const UNKNOWN_NOISE: f64 = 3.0;
 
 /// What the window says of a fault.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Weighed {
     /// Logarithm of how much more likely the window is with it than without.
     pub log_ratio: f64,
@@ -101,21 +102,25 @@ pub struct DrivePlace {
 }
 
 /// What is usual of a window, in its size and in its roughness.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Laws {
     /// The law of windows that begin with each block.
+    #[checkpoint(each)]
     pub mean: Vec<Law>,
     /// None if the log does not tell it.
+    #[checkpoint(each)]
     pub scatter: Option<ScatterLaw>,
 }
 
 /// The bank.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Bank {
     window: Window,
     laws: Laws,
     first: usize,
+    #[checkpoint(fixed)]
     channels: Vec<ChannelPlace>,
+    #[checkpoint(fixed)]
     drives: Vec<DrivePlace>,
     /// The declared faults, whose components are the last ones.
     declared: DeclaredFaults,

@@ -1,11 +1,12 @@
 //! What is believed of a robot's components.
 
 use vigil_blocks::SizeKind;
+use vigil_checkpoint::CheckpointValue;
 
 use super::fault_kind::FaultKind;
 
 /// What is believed of one component, given that something is wrong.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct ComponentBelief {
     /// Probability that it is this one.
     pub p: f64,
@@ -31,7 +32,7 @@ pub(super) const NO_BELIEF: ComponentBelief = ComponentBelief {
 };
 
 /// Two faults at once.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct PairBelief {
     /// Probability that it is both, given that something is wrong.
     pub p: f64,

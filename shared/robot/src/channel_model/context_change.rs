@@ -8,6 +8,7 @@
 //! step is to say little of the law, so that both are Student's.
 
 use serde::{Deserialize, Serialize};
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_inference::logspace::log_sum_exp;
 
 use super::CHANNELS_MAX;
@@ -219,7 +220,7 @@ impl ContextChanges {
 }
 
 /// A change that was told.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, CheckpointValue)]
 pub struct ToldChange {
     /// Place of the context in the robot's description.
     pub context: usize,
@@ -228,10 +229,12 @@ pub struct ToldChange {
 }
 
 /// Tells changes in windows that follow each other.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct ChangeWatch {
     /// With their places in the description.
+    #[checkpoint(fixed)]
     watched: Vec<(usize, ContextChange)>,
+    #[checkpoint(fixed)]
     seen: StepChannels,
     /// Time for which none is told yet, s.
     wait_s: f64,

@@ -1,5 +1,6 @@
 //! The faults that a description declares, weighed over the last few seconds.
 
+use vigil_checkpoint::Checkpoint;
 use vigil_inference::logspace::log_sum_exp;
 
 use super::component::Target;
@@ -14,14 +15,17 @@ use crate::description::Description;
 use crate::fault_table::{DECLARED_MAX, DeclaredFault};
 
 /// One fault at work.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 struct Declared {
     /// Shifts of the channels in which it is declared to show, for windows that begin with each
     /// block; empty if none are declared, or one of them is not in use.
+    #[checkpoint(fixed)]
     shifts: Vec<ShiftLaw>,
     /// How it showed in labelled runs.
+    #[checkpoint(fixed)]
     signature: Option<Signature>,
     /// How it came back in them with the turns of a wheel.
+    #[checkpoint(fixed)]
     turning: Option<TurningFault>,
     evidence: Evidence,
 }
@@ -69,11 +73,13 @@ pub struct FaultPair {
 }
 
 /// All of a robot's.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct DeclaredFaults {
+    #[checkpoint(each)]
     all: Vec<Declared>,
     /// Evidence of each by what the likeliest fault of another wheel does not explain.
     further: Vec<Evidence>,
+    #[checkpoint(fixed)]
     signatures: Signatures,
     channels: usize,
 }

@@ -1,11 +1,12 @@
 //! The ways in which sensors and drives fail.
 
 use vigil_blocks::SizeKind;
+use vigil_checkpoint::CheckpointValue;
 
 use super::component::Quantity;
 
 /// A way in which a component fails.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, CheckpointValue)]
 pub enum FaultKind {
     /// A sensor reads this much more, in its unit.
     Bias,

@@ -11,6 +11,7 @@
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
+use vigil_checkpoint::Checkpoint;
 
 use super::CHANNELS_MAX;
 
@@ -87,17 +88,24 @@ impl Change {
 }
 
 /// The law at work: what the last window says.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Law {
+    #[checkpoint(fixed)]
     channels: usize,
     /// The first block of the window that is there.
+    #[checkpoint(fixed)]
     first: usize,
+    #[checkpoint(fixed)]
     directions: Vec<Direction>,
+    #[checkpoint(fixed)]
     precision: Vec<Square>,
     /// Inverse of the covariance of one block, by rows.
+    #[checkpoint(fixed)]
     spatial: Vec<f64>,
     /// Precision of each channel's blocks given all others, and its inverse from each block on.
+    #[checkpoint(fixed)]
     own: Vec<Square>,
+    #[checkpoint(fixed)]
     own_inverse: Vec<[Square; BLOCKS]>,
     /// The window, completed: residuals by channel, and `Pz`.
     z: [Row; CHANNELS_MAX],

@@ -9,6 +9,7 @@
 //! by as much.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::Checkpoint;
 use vigil_inference::logspace::{log_add, log_sum_exp};
 
 use super::bank::{Bank, ChannelPlace, DrivePlace, IMPOSSIBLE, KINDS_MAX, Laws, Weighed};
@@ -80,22 +81,25 @@ impl Part {
 }
 
 /// A component at work.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Checkpoint)]
 struct Watch {
     /// Whether the channels in use show it.
     is_seen: bool,
+    #[checkpoint(fixed)]
     part: Part,
     /// Slot of its evidence.
     slot: usize,
 }
 
 /// The detection filter, and what names its faults.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Monitor {
     bank: Bank,
+    #[checkpoint(fixed)]
     ranges: Vec<Range>,
     /// Size of each axis of the command.
     sizes: [f64; AXES],
+    #[checkpoint(fixed)]
     combinations: Combinations,
     /// Observations that a prediction looks back.
     lags: usize,
@@ -103,7 +107,9 @@ pub struct Monitor {
     knows_rest: bool,
     /// Places of the channels in an observation.
     places: Vec<usize>,
+    #[checkpoint(each)]
     watched: Vec<Watch>,
+    #[checkpoint(fixed)]
     tails: [Option<Tail>; Class::ALL.len()],
     /// What the prior fault rate adds to the log-odds.
     prior_log_odds: f64,

@@ -1,6 +1,7 @@
 //! Frames averaged into observations, for robots of any kind.
 
 use vigil_blocks::{CHANNELS, SensorFrame};
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_inference::angle::wrap;
 
 use super::component::{Quantity, Target, targets};
@@ -31,7 +32,7 @@ const CHANGE: f64 = 0.1;
 pub const SMOOTHING_S: [f64; 2] = [0.5, 2.0];
 
 /// What was measured over one interval.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Observation {
     /// Capture time of its last frame, ns.
     pub t_ns: u64,
@@ -68,7 +69,7 @@ impl Default for Observation {
 }
 
 /// The last few observations of one unbroken record.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 pub struct History {
     last: [Observation; DEPTH],
     count: usize,
@@ -119,7 +120,7 @@ pub fn smoothed(last: Option<&Observation>, now: &Observation) -> [[f64; AXES]; 
 }
 
 /// Sum of the readings of one channel; of an angle each is taken next to the first.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 struct Mean {
     first: f64,
     sum: f64,
@@ -158,10 +159,13 @@ fn turning(robot: &Description, targets: &[Target]) -> Vec<(usize, usize)> {
 }
 
 /// Builds observations from frames.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Observer {
+    #[checkpoint(fixed)]
     robot: Description,
+    #[checkpoint(fixed)]
     map: ChannelMap,
+    #[checkpoint(fixed)]
     targets: Vec<Target>,
     history: History,
     started: bool,

@@ -12,6 +12,7 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::Complex;
+use vigil_checkpoint::CheckpointValue;
 
 use super::CHANNELS_MAX;
 
@@ -40,7 +41,7 @@ const PERIOD_RAD: f64 = 50.0 * TAU;
 pub type ByOrder = [Complex<f64>; ORDERS];
 
 /// What the channels show in step with one wheel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, CheckpointValue)]
 pub struct WheelOrders {
     /// The wheel.
     pub wheel: usize,
@@ -92,7 +93,7 @@ impl WheelOrders {
 
 /// Sums of one channel and order: at the order, beside it, and of the squared steps in which it was
 /// seen.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 struct Sums {
     at: Complex<f64>,
     beside: [Complex<f64>; BESIDE.len()],
@@ -118,7 +119,7 @@ impl Sums {
 }
 
 /// Means that are taken off a channel.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 struct Means {
     /// Of the readings, and of what is left once that is taken off; none before the first reading.
     means: Option<[f64; 2]>,
@@ -140,7 +141,7 @@ impl Means {
 }
 
 /// How a wheel turns.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 struct Turns {
     /// Place of the wheel's rate among the channels.
     rate: usize,
@@ -219,7 +220,7 @@ impl Shown {
 }
 
 /// What is remembered of one wheel's turns.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 struct Memory {
     turns: f64,
     sums: Vec<Sums>,
@@ -284,14 +285,14 @@ pub(super) fn over(numerator: f64, denominator: f64) -> f64 {
 }
 
 /// One wheel.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 struct TrackedWheel {
     means: Vec<Means>,
     memories: [Memory; MEMORIES_TURNS.len()],
 }
 
 /// Follows the turns of wheels.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 pub(super) struct OrderTracker {
     turns: Vec<Turns>,
     wheels: Vec<TrackedWheel>,

@@ -3,6 +3,7 @@
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
+use vigil_checkpoint::Checkpoint;
 
 use super::CHANNELS_MAX;
 
@@ -37,11 +38,15 @@ pub fn log_roughness((mean_square, count): (f64, usize)) -> Option<f64> {
 }
 
 /// The law at work.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct ScatterLaw {
+    #[checkpoint(fixed)]
     channels: usize,
+    #[checkpoint(fixed)]
     mean: [f64; CHANNELS_MAX],
+    #[checkpoint(fixed)]
     variance: [f64; CHANNELS_MAX],
+    #[checkpoint(fixed)]
     precision: Vec<f64>,
     apart: [f64; CHANNELS_MAX],
     gradient: [f64; CHANNELS_MAX],

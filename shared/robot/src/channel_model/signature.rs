@@ -8,6 +8,7 @@
 //! Successive ratios are of the same residuals, so they are averaged over time and never summed.
 
 use serde::{Deserialize, Serialize};
+use vigil_checkpoint::CheckpointValue;
 
 use super::law::BLOCKS;
 use super::observation::{Observation, SMOOTHING_S};
@@ -187,7 +188,7 @@ impl Signature {
 }
 
 /// The evidence for one fault, averaged over time and never below zero.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, CheckpointValue)]
 pub struct Evidence {
     log_ratio: f64,
     /// The same of ratios that are not bounded.

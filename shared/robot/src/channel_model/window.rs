@@ -1,5 +1,7 @@
 //! The last few seconds of residuals and predictions, in blocks.
 
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
+
 use super::channel::{CLIP, Channel, Commands, Scales};
 use super::law::{BLOCK_S, BLOCKS, Row};
 use super::observation::History;
@@ -24,7 +26,7 @@ const CONTEXT_SHARE: f64 = 0.5;
 const CONTEXT_MAX: f64 = 2.0;
 
 /// A channel's own offset and gain in a run.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 struct Context {
     /// Sums of products of what they are multiplied by: of the offset, both, the gain.
     information: [f64; 3],
@@ -70,7 +72,7 @@ impl Context {
 }
 
 /// One observation.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 struct Moment {
     /// False for what came before the record began.
     is_there: bool,
@@ -98,9 +100,11 @@ const NOTHING: Moment = Moment {
 };
 
 /// The window. Rows hold the means of its blocks, the oldest first.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Window {
+    #[checkpoint(fixed)]
     channels: Vec<(usize, Channel)>,
+    #[checkpoint(fixed)]
     scales: Scales,
     /// Observations of a block.
     per_block: usize,

@@ -45,6 +45,7 @@ mod lag_bounds;
 mod pose;
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_inference::e_detector::level::{Level, LevelReading};
 use vigil_inference::e_detector::{EDetector, repeats};
 
@@ -150,7 +151,7 @@ fn of_rover(robot: &Description) -> Result<Tolerance, UndeclaredError> {
 }
 
 /// One channel's detectors.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 struct Wheel {
     rate: Level,
     steer: Level,
@@ -158,14 +159,19 @@ struct Wheel {
 }
 
 /// The detector over observations.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Monitor {
+    #[checkpoint(fixed)]
     model: Model,
+    #[checkpoint(fixed)]
     robot: Description,
     tolerance: Tolerance,
+    #[checkpoint(fixed)]
     null: Null,
     use_wheels: bool,
+    #[checkpoint(fixed)]
     promise: Promise,
+    #[checkpoint(fixed)]
     lag: LagBounds,
     pose: PoseBlocks,
     wheels: [Wheel; WHEELS],

@@ -4,6 +4,7 @@
 //! most, the true heading leaves the predicted one by the context's bound and by five deviations of
 //! what chance has turned it: these turn the predicted travel, and widen what is allowed of it.
 
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::angle::wrap;
 use vigil_inference::e_detector::path::{BOUND, Path, PathReading};
 
@@ -31,7 +32,7 @@ pub(super) struct PoseStep {
 }
 
 /// One block: heading, x and y in the frame of its first pose.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 struct Block {
     /// Observations to wait before it begins.
     wait: u32,
@@ -116,7 +117,7 @@ impl Block {
 }
 
 /// All blocks.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 pub(super) struct PoseBlocks {
     blocks: [Block; COUNT],
 }

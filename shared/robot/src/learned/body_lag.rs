@@ -6,6 +6,8 @@
 //! nothing is learned and no lasting fault can pass for a lag. What the candidates disagree about
 //! is the uncertainty of the prediction.
 
+use vigil_checkpoint::CheckpointValue;
+
 /// Candidate time constants, s: the range that is tolerated in a healthy robot.
 const LAGS_S: [f64; LAGS] = [0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5];
 /// Number of candidates.
@@ -53,7 +55,7 @@ pub struct FollowedMotion {
 }
 
 /// One candidate.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 struct Candidate {
     /// Yaw rate rad/s and speed m/s of the body.
     body: [f64; 2],
@@ -71,7 +73,7 @@ struct Candidate {
 }
 
 /// The bank.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 pub struct BodyLag {
     candidates: [Candidate; LAGS],
     command: [f64; 2],
@@ -88,7 +90,7 @@ pub struct BodyLag {
 
 /// What is not known of the body because the command changed at some instant between two frames:
 /// after a gap it may be about to follow, or have followed long ago. Standard deviations.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 struct TimingDeviation {
     /// Of yaw rate, rad/s, and speed, m/s.
     rates: [f64; 2],
@@ -124,7 +126,7 @@ impl TimingDeviation {
 }
 
 /// What was measured since a window began.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 struct Window {
     observations: u32,
     measured: [f64; 2],

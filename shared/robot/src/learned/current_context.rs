@@ -8,6 +8,7 @@
 //! large as a share of them.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::slow_state::{Drift, SlowState};
 
 use super::wheel_context::FAR_SD;
@@ -28,7 +29,7 @@ pub(super) struct CurrentBeside {
 }
 
 /// The slow states of the currents; without a tolerance they are 0 for certain.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 pub(super) struct CurrentContext {
     tolerance: Option<FurtherTolerance>,
     /// By what pulls ahead, A in every wheel, and to the side, A in a wheel steered by 90 degrees.

@@ -1,5 +1,6 @@
 //! In which way a broken encoder is broken, and by how much better that fits than a whole one.
 
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::alternative::Alternatives;
 
 /// Probability that an encoder is broken in each other way from an observation on. Chosen: it
@@ -20,7 +21,7 @@ pub(super) struct Fits {
 }
 
 /// The ways of one encoder.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 pub(super) struct EncoderWays(Alternatives<4>);
 
 impl Default for EncoderWays {

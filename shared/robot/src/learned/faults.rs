@@ -2,6 +2,7 @@
 //! ones do. Trying those besides the unknown lets the detector see them sooner, and nothing later.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::Checkpoint;
 use vigil_inference::departure::Kind;
 use vigil_inference::track::{Displacement, MotionNoise};
 
@@ -15,11 +16,13 @@ pub const KINDS: usize = 1 + WHEELS;
 const SHARE_ANYTHING: f64 = 0.5;
 
 /// Kinds of faults.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Faults {
+    #[checkpoint(fixed)]
     anything: MotionNoise,
     /// Whether ground has a tolerance, within which a departure is no fault.
     is_bounded: bool,
+    #[checkpoint(fixed)]
     learned: [Option<(MotionModel, MotionNoise)>; WHEELS],
 }
 

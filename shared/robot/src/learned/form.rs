@@ -1,5 +1,6 @@
 //! How a group of channels turns its whitened residuals into evidence for a fault.
 
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::ages::{self, Ages, WhitenedResidual};
 use vigil_inference::constant::Constant;
 use vigil_inference::outlier::tempered;
@@ -55,7 +56,7 @@ impl Form {
 }
 
 /// Detection over the residuals of one group, of D dimensions.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 pub(crate) enum Evidence<const D: usize> {
     LearnedBias(Ages<D>),
     Constant(Constant),

@@ -3,6 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 use vigil_blocks::{SensorFrame, WHEELS};
+use vigil_checkpoint::CheckpointValue;
 
 use super::Reading;
 use crate::channel_map::ChannelMap;
@@ -119,7 +120,7 @@ impl FurtherModel {
 }
 
 /// What one observation holds of the further channels.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 pub struct Further {
     /// Yaw rate, rad/s.
     pub yaw_rate: Reading,
@@ -128,7 +129,7 @@ pub struct Further {
 }
 
 /// Collects them, frame by frame.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, CheckpointValue)]
 pub(super) struct Collector {
     last: (Option<f64>, [Option<f64>; WHEELS]),
     sums: Further,

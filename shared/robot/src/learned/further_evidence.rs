@@ -6,6 +6,7 @@
 //! of exact repeats.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::Checkpoint;
 use vigil_inference::ages::WhitenedResidual;
 
 use super::form::{Evidence, Form};
@@ -29,9 +30,10 @@ const BIAS_CURRENT: f64 = 1.0;
 const BIAS_GYRO: f64 = 3.0;
 
 /// Evidence of gyro and currents.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub(super) struct FurtherEvidence {
     watch: FurtherWatch,
+    #[checkpoint(fixed)]
     form: Form,
     currents: [Evidence<1>; WHEELS],
     gyro: Evidence<1>,

@@ -4,6 +4,7 @@
 //! turn of the pose's track, and the gyro's bias. Noise and context are learned on the way.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_inference::slow_state::{Drift, SlowState};
 use vigil_inference::track::Displacement;
 
@@ -50,7 +51,7 @@ impl Turn {
 }
 
 /// One channel beside what is expected of it, in its own unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Residual {
     /// As read, less what is expected.
     pub apart: f64,
@@ -63,7 +64,7 @@ pub struct Residual {
 }
 
 /// Of one observation; None where a channel was not read.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 pub struct Residuals {
     /// Motor currents, A.
     pub currents: [Option<Residual>; WHEELS],
@@ -75,8 +76,9 @@ pub struct Residuals {
 pub(super) const GYRO: usize = WHEELS;
 
 /// Follows gyro and currents.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct FurtherWatch {
+    #[checkpoint(fixed)]
     model: FurtherModel,
     wheels: usize,
     context: CurrentContext,

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::HealthyBelief;
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::track::{Context, MotionNoise, Track};
 
 use super::{Model, WheelContext};
@@ -14,7 +15,7 @@ const UNSURE_M: f64 = 0.01;
 const VARIANCE_MAX: f64 = 1e6;
 
 /// Pose, and the context of motion and wheels.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Healthy {
     /// Mean pose: x m, y m, yaw rad.
     pub pose: Vector3<f64>,

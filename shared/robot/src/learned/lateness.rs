@@ -5,6 +5,7 @@
 //! `(odds + birth) x likelihood ratio` (Shiryaev), where a reading shows it.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::ages::LOG_ODDS_MAX;
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
 use vigil_inference::outlier::SPREAD;
@@ -39,7 +40,7 @@ impl Timely {
 
 /// Log-odds that a wheel's encoder is late, by each delay and in all, and what the last reading
 /// said for that, if a delay would have shown.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 struct Odds {
     delays: [f64; DELAYS_S.len()],
     all: f64,
@@ -53,7 +54,7 @@ const NONE: Odds = Odds {
 };
 
 /// Of all encoders.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 pub(super) struct Lateness {
     past: PastRates,
     wheels: [Odds; WHEELS],

@@ -13,6 +13,7 @@
 //! residuals: 256 of them were too few to tell a misjudged first heading from a fault.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_inference::ages::WhitenedResidual;
 use vigil_inference::constant::Constant;
 use vigil_inference::departure::{Departure, Suspicion};
@@ -66,11 +67,15 @@ const READY_S: f64 = 1.0;
 const COAST_MAX: u32 = 10;
 
 /// The detection filter.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Monitor {
+    #[checkpoint(fixed)]
     model: Model,
+    #[checkpoint(fixed)]
     robot: Description,
+    #[checkpoint(fixed)]
     channels: Channels,
+    #[checkpoint(fixed)]
     form: Form,
     fault_rate_1_s: f64,
     tracking: bool,
@@ -88,13 +93,14 @@ pub struct Monitor {
     any: Constant,
     noise: SensorNoise,
     troubles: Troubles,
+    #[checkpoint(each)]
     further: Option<Box<FurtherEvidence>>,
     gains: Gains,
     report: DetectionOutput,
 }
 
 /// What the last observation said for a fault in each group of channels.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 struct Gains {
     pose: f64,
     any: f64,
@@ -103,7 +109,7 @@ struct Gains {
 }
 
 /// Result of the last observation.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct DetectionOutput {
     /// Natural log-odds that the robot is not in its nominal mode.
     pub log_odds: f64,

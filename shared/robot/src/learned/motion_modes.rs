@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::track::MotionNoise;
 
 use super::together::{Together, is_immobile};
@@ -79,7 +80,7 @@ const P_ALIKE: f64 = 0.4;
 const SHAPE: [f64; 3] = [0.1, 0.1, 0.5];
 
 /// What moves the robot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, CheckpointValue)]
 pub enum Mover {
     /// All wheels as commanded.
     Nominal,

@@ -1,6 +1,7 @@
 //! How much noisier the sensors are than the learned ones.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::angle::wrap;
 
 use super::wheels::{rolling_rate, steering_angle};
@@ -57,7 +58,7 @@ const EVEN: f64 = 1.25;
 
 /// How much noisier each channel is than learned, as ratios of standard deviations. A channel has
 /// a scale of its own: one that is noisy hides nothing on another.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct NoiseScales {
     /// The pose: x, y, yaw.
     pub pose: [f64; 3],
@@ -70,7 +71,7 @@ pub struct NoiseScales {
 }
 
 /// Share of the samples of each channel that are far off, one by one.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct OutlierRates {
     /// The pose: x, y, yaw.
     pub pose: [f64; 3],
@@ -106,7 +107,7 @@ impl Default for NoiseScales {
 ///
 /// While the channel is suspected, more noise may be the fault, and would hide its return: it is
 /// seen apart, and believed only once it has settled within what a healthy channel may have.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct NoiseScale {
     /// Of the healthy channel.
     healthy: NoiseTally,
@@ -139,7 +140,7 @@ impl Default for NoiseScale {
 }
 
 /// Squares over those of the learned noise, and how many, fading.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 struct NoiseTally {
     sum: f64,
     count: f64,
@@ -164,7 +165,7 @@ impl NoiseTally {
 }
 
 /// Outliers, and samples of which it was asked whether they are, fading.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 struct OutlierTally {
     outliers: f64,
     asked: f64,
@@ -328,7 +329,7 @@ pub(super) const UNSEEN_S: f64 = 5.0;
 const UNSEEN: f64 = 16.0;
 
 /// How noisy the sensors are, from differences between successive observations.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 pub struct SensorNoise {
     moved_s: f64,
     pose: [NoiseScale; 3],

@@ -1,6 +1,7 @@
 //! Frames averaged into one observation: what the filters step by.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::track::Displacement;
 
 use super::troubles::Troubles;
@@ -13,7 +14,7 @@ const STEADY_1_M: f64 = 0.1;
 const RESTS: f64 = 0.1;
 
 /// Frames averaged over about the learned interval.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 pub struct Observation {
     /// Capture time of the last frame, ns.
     pub t_ns: u64,

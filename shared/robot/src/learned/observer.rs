@@ -6,6 +6,7 @@
 //! prediction. Exact repeats of an encoder are counted frame by frame, before averaging.
 
 use vigil_blocks::{SensorFrame, WHEELS};
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_inference::angle::wrap;
 
 use super::further::{Collector, Further};
@@ -42,8 +43,9 @@ pub struct FrameOutcome {
 }
 
 /// Builds observations from frames.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Observer {
+    #[checkpoint(fixed)]
     map: ChannelMap,
     wheel_count: usize,
     wheel_rate_max: f64,
@@ -51,7 +53,9 @@ pub struct Observer {
     speed_max: f64,
     interval_s: f64,
     standing_m_s: f64,
+    #[checkpoint(fixed)]
     limits: RestLimits,
+    #[checkpoint(fixed)]
     model: Box<Model>,
     is_suspected: bool,
     state: State,
@@ -61,7 +65,7 @@ pub struct Observer {
 }
 
 /// What carries over from frame to frame.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 struct State {
     run_id: u64,
     t_ns: u64,
@@ -84,7 +88,7 @@ struct State {
 }
 
 /// Sums over the frames of the observation under way.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 struct Sums {
     frames: u32,
     elapsed_s: f64,

@@ -5,6 +5,7 @@
 //! does, and nothing is said.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 
 /// Delays, s: each a third longer than the one before, up to the longest that is looked for.
 /// Shorter is within the body's lag.
@@ -21,7 +22,7 @@ const ALIKE_RAD_S: f64 = 0.05;
 pub type Rates = [(f64, f64); WHEELS];
 
 /// The rates of the last seconds.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 pub struct PastRates {
     past: [(u64, Rates); KEPT],
     /// Place of the last one kept, and how many there are.

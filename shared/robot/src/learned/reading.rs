@@ -1,8 +1,10 @@
 //! What one channel read in one observation.
 
+use vigil_checkpoint::CheckpointValue;
+
 /// Samples of one channel in one observation: those that differ from their predecessor, and how
 /// many repeated it exactly.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 pub struct Reading {
     /// Samples that differ from their predecessor.
     pub plain: u32,

@@ -1,5 +1,6 @@
 //! Whether a sensor repeats itself exactly, as a frozen or dead one does.
 
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::departure::LOG_ODDS_MAX;
 use vigil_inference::logspace::log_add;
 
@@ -18,7 +19,7 @@ pub fn log_ratio(reading: &Reading, healthy: f64) -> f64 {
 }
 
 /// Log-odds that a sensor is frozen, and what the last observation said for it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub(super) struct Repeats {
     pub log_odds: f64,
     pub gain: f64,

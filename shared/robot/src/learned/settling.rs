@@ -3,6 +3,8 @@
 //! Of two poses that disagree either may be the outlier. So after a gap or a jump none is evidence
 //! until some in a row agree, and one that does not agree begins anew.
 
+use vigil_checkpoint::CheckpointValue;
+
 /// Poses in a row that must agree. Chosen: with fewer, two outliers may agree by chance; with more,
 /// the pose is no evidence for longer.
 const SETTLES: u32 = 3;
@@ -11,10 +13,10 @@ const SETTLES: u32 = 3;
 const SETTLING_MAX: u32 = 10;
 
 /// Poses since it began anew; settled by default.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, CheckpointValue)]
 pub(super) struct Settling(Option<Poses>);
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, CheckpointValue)]
 struct Poses {
     seen: u32,
     /// So many of the last of them agree.

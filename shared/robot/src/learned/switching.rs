@@ -10,6 +10,7 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_inference::angle::wrap;
 use vigil_inference::gaussian::Gaussian;
 use vigil_inference::hybrid::{Conditional, Modes, Sampled};
@@ -46,10 +47,13 @@ struct Mode {
 }
 
 /// The learned model of one robot with one fault at most.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct Switching {
+    #[checkpoint(fixed)]
     model: Model,
+    #[checkpoint(fixed)]
     robot: Description,
+    #[checkpoint(fixed)]
     modes: Vec<Mode>,
     /// Row d: `P(d' | d)`.
     transition: Vec<f64>,
@@ -71,7 +75,7 @@ pub struct SwitchingObservation {
 }
 
 /// The continuous state of a particle.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct RoverState {
     /// x m, y m, yaw rad (not wrapped).
     pub pose: Vector3<f64>,
@@ -81,7 +85,7 @@ pub struct RoverState {
 }
 
 /// Modes that share an offset: it is drawn anew when the family changes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, CheckpointValue)]
 enum Family {
     Nominal,
     Stuck,

@@ -4,6 +4,7 @@
 //! belief, and a robot that should stand is not weighed at all: both would pass for health.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::angle::wrap;
 
 use super::{Model, Observation};
@@ -39,7 +40,7 @@ const NOISE_SD: f64 = 6.0;
 const TURNING_RAD_S: f64 = 0.3;
 
 /// What is the matter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, CheckpointValue)]
 pub struct Troubles {
     /// No pose for a while.
     pub pose_silent: bool,
@@ -65,7 +66,7 @@ impl Troubles {
 }
 
 /// Watches for troubles, observation by observation.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 pub struct PlausibilityCheck {
     pose_silent_s: f64,
     last_pose: Option<[f64; 3]>,

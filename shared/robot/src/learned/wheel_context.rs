@@ -6,6 +6,7 @@
 //! itself.
 
 use vigil_blocks::{HealthyBelief, WHEELS};
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::slow_state::SlowState;
 
 use crate::tolerance::Tolerance;
@@ -33,7 +34,7 @@ pub struct RateResidual {
 }
 
 /// The slow states of the wheels; without a tolerance they are 0 for certain.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, CheckpointValue)]
 pub struct WheelContext {
     tolerance: Option<Tolerance>,
     ratio: SlowState,

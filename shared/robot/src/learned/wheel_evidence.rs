@@ -1,6 +1,7 @@
 //! What the wheels of one observation say, for everything that each may be doing.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::logspace::log_add;
 
 use super::steer_reading::{ANYTHING, SteerReading};
@@ -73,7 +74,7 @@ pub struct WheelEvidence {
 }
 
 /// How a wheel turns while others drag.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct WheelDrag {
     /// Expected rate, rad/s.
     pub rate_rad_s: f64,

@@ -2,6 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
+use vigil_checkpoint::CheckpointValue;
+
 use crate::description::{Description, Kinematics};
 
 /// Channels that each wheel has.
@@ -12,7 +14,7 @@ pub(super) enum WheelChannel {
 }
 
 /// Kind of a finding. The value is its code in events.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, CheckpointValue)]
 #[repr(u32)]
 pub enum FindingKind {
     /// The pose moves so many times the commanded travel.
@@ -82,7 +84,7 @@ impl FindingKind {
 }
 
 /// A disagreement between frames and description.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Finding {
     /// What disagrees.
     pub kind: FindingKind,

@@ -16,6 +16,7 @@ mod scope;
 mod wheels;
 
 use vigil_blocks::SensorFrame;
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 
 use crate::channel_map::ChannelMap;
 use crate::description::{Description, Kinematics};
@@ -83,11 +84,13 @@ struct Motion {
 }
 
 /// The tests of one publisher.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub struct PublisherCheck {
+    #[checkpoint(fixed)]
     robot: Description,
     poses: Poses,
     wheels: Wheels,
+    #[checkpoint(fixed)]
     map: ChannelMap,
     gyro: GyroSums,
     last: Option<LastFrame>,
@@ -109,7 +112,7 @@ pub struct PublisherCheck {
 }
 
 /// The frame before.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 struct LastFrame {
     epoch: u64,
     run_id: u64,
@@ -136,7 +139,7 @@ impl LastFrame {
 }
 
 /// Sums of a gyro's rate against the commanded yaw rate.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 struct GyroSums {
     /// Measured times commanded rate.
     product: f64,

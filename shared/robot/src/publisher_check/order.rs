@@ -1,6 +1,7 @@
 //! Which wheel each channel of a kind reads: measured against what every wheel's should read.
 
 use vigil_blocks::WHEELS;
+use vigil_checkpoint::CheckpointValue;
 
 /// Ratio of squared residuals below which one order fits and another does not: half the deviation.
 const EXCHANGED: f64 = 0.25;
@@ -22,7 +23,7 @@ pub(super) enum Gain {
 }
 
 /// Sums of the channels of a kind, and of what each wheel's should read.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, CheckpointValue)]
 pub(super) struct OrderSums {
     /// Time over which they were taken, s.
     pub time_s: f64,
@@ -35,7 +36,7 @@ pub(super) struct OrderSums {
 }
 
 /// Squared residuals by channel and by the wheel that it may read, and the order that fits best.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, CheckpointValue)]
 pub(super) struct Order {
     costs: [[f64; WHEELS]; WHEELS],
     reads: [usize; WHEELS],

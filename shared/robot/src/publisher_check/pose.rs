@@ -1,5 +1,6 @@
 //! Pose against command, over stretches of half a second.
 
+use vigil_checkpoint::CheckpointValue;
 use vigil_inference::angle::wrap;
 
 use super::{Finding, FindingKind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
@@ -25,7 +26,7 @@ const ANGLE_MAX_RAD: f64 = 0.6;
 const CERTAIN: f64 = 4.0;
 
 /// A stretch under way.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 struct Stretch {
     from: [f64; 3],
     last_yaw: f64,
@@ -36,7 +37,7 @@ struct Stretch {
 }
 
 /// Sums over the stretches of a run.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 pub(super) struct Poses {
     stretch: Option<Stretch>,
     count: f64,

@@ -1,5 +1,7 @@
 //! A channel against what is expected of it.
 
+use vigil_checkpoint::CheckpointValue;
+
 /// Ratios between this and its inverse are those of a channel with the other sign: -1, by a factor
 /// of 2.5 either way for slip and gains.
 const REVERSED: f64 = -0.4;
@@ -8,7 +10,7 @@ const REVERSED: f64 = -0.4;
 const FOLLOWS: f64 = 0.6;
 
 /// Sums of a channel against what is expected of it.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 pub struct RegressionSums {
     /// Time over which they were taken, s.
     pub time_s: f64,

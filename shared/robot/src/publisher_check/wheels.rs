@@ -1,6 +1,7 @@
 //! Wheel rates and steering angles against the command, wheel by wheel.
 
 use vigil_blocks::{SensorFrame, WHEELS};
+use vigil_checkpoint::Checkpoint;
 
 use super::finding::{WheelChannel, is_rate_unit};
 use super::order::{Gain, Order, OrderSums};
@@ -27,8 +28,9 @@ const TURN_ENOUGH_RAD: f64 = std::f64::consts::TAU;
 const PLACES: [usize; WHEELS] = [0, 1, 2, 3, 4, 5, 6, 7];
 
 /// All wheels of a robot.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub(super) struct Wheels {
+    #[checkpoint(fixed)]
     kinematics: Kinematics,
     x_m: [f64; WHEELS],
     y_m: [f64; WHEELS],

@@ -33,6 +33,9 @@ use tree::{Limits, Tree};
 /// plans anew for rounding.
 const STANDS: f64 = 1e-3;
 
+/// Trials that are taken up again at most: a full tree grows no more.
+const SEARCHED_MAX: usize = 1 << 24;
+
 /// Plans for one belief after another; all memory is allocated by [`Despot::new`].
 ///
 /// The value of an action is its lower bound: what the best plan found that begins with it earns in
@@ -48,6 +51,8 @@ pub struct Despot {
     is_planned: bool,
     /// True if the search for this belief began with the last decision.
     is_fresh: bool,
+    /// Trials for this belief so far.
+    searched: usize,
     votes: Votes,
 }
 
@@ -87,6 +92,7 @@ impl Despot {
             belief: vec![0.0; model.states().len()],
             is_planned: false,
             is_fresh: false,
+            searched: 0,
             votes: Votes::new(solution),
             generator,
         })
@@ -95,6 +101,7 @@ impl Despot {
     /// Goes on with the search for the belief of the last decision. False once there is nothing to
     /// gain, or no room.
     pub fn search(&mut self, trials: usize) -> bool {
+        self.searched = self.searched.saturating_add(trials);
         (0..trials).all(|_| self.tree.grow(&self.generator, &mut self.sampler))
     }
 
@@ -119,11 +126,17 @@ impl Despot {
             return false;
         }
         self.take(belief);
+        self.plant();
+        self.search(self.trials);
+        true
+    }
+
+    /// Begins a tree for the belief that was taken.
+    fn plant(&mut self) {
         self.tree
             .plant(&self.generator, &mut self.sampler, &self.belief);
         self.is_planned = true;
-        self.search(self.trials);
-        true
+        self.searched = 0;
     }
 
     /// Entries that are no positive number count as 0; a belief of nothing else as uniform.
@@ -173,5 +186,25 @@ impl Policy for Despot {
     fn reset(&mut self) {
         self.is_planned = false;
         self.is_fresh = false;
+    }
+
+    /// The tree follows from the belief and the trials.
+    fn keep(&self, put: &mut dyn FnMut(f64)) {
+        put(f64::from(u8::from(self.is_planned)));
+        put(f64::from(u8::from(self.is_fresh)));
+        put(self.searched as f64);
+        self.belief.iter().for_each(|b| put(*b));
+    }
+
+    fn resume(&mut self, take: &mut dyn FnMut() -> f64) {
+        let is_planned = take() != 0.0;
+        self.is_fresh = take() != 0.0;
+        let searched = (take() as usize).min(SEARCHED_MAX);
+        self.belief.iter_mut().for_each(|b| *b = take());
+        self.is_planned = false;
+        if is_planned {
+            self.plant();
+            self.search(searched);
+        }
     }
 }

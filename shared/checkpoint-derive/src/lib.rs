@@ -1,0 +1,261 @@
+#![doc = include_str!("../README.md")]
+
+use proc_macro::TokenStream;
+use proc_macro2::TokenStream as Tokens;
+use quote::{format_ident, quote};
+use syn::spanned::Spanned;
+use syn::{
+    Data, DeriveInput, Error, Field, Fields, Generics, Index, Member, Path, parse_macro_input,
+};
+
+/// How a field takes part.
+#[derive(Clone)]
+enum Part {
+    /// It is saved and loaded.
+    State,
+    /// It follows from the configuration, and is left as it is.
+    Fixed,
+    /// A collection whose length follows from the configuration: each element is loaded in place.
+    Each,
+    /// A module has the functions `save` and `load`, for a type that knows no checkpoints.
+    With(Path),
+}
+
+/// Derives `Checkpoint`: fields are saved and loaded in place, one after the other. Of an enum, the
+/// variant is to be the same. `#[checkpoint(fixed)]` leaves a field out; `#[checkpoint(each)]`
+/// keeps a collection's length; `#[checkpoint(with = path)]` uses `path::save` and `path::load`.
+/// `#[checkpoint(bound = "T: Bound")]` on the type adds a bound.
+#[proc_macro_derive(Checkpoint, attributes(checkpoint))]
+pub fn derive_checkpoint(input: TokenStream) -> TokenStream {
+    let input = parse_macro_input!(input as DeriveInput);
+    let derived = match &input.data {
+        Data::Struct(data) => in_place_struct(&input, &data.fields),
+        Data::Enum(data) => in_place_enum(&input, data.variants.iter()),
+        Data::Union(_) => Err(Error::new(input.span(), "a union has no state of its own")),
+    };
+    derived.unwrap_or_else(Error::into_compile_error).into()
+}
+
+/// Derives `Checkpoint` and `CheckpointValue`: the whole value is state, and is made anew.
+#[proc_macro_derive(CheckpointValue, attributes(checkpoint))]
+pub fn derive_checkpoint_value(input: TokenStream) -> TokenStream {
+    let input = parse_macro_input!(input as DeriveInput);
+    let derived = match &input.data {
+        Data::Struct(data) => value_struct(&input, &data.fields),
+        Data::Enum(data) => value_enum(&input, data.variants.iter()),
+        Data::Union(_) => Err(Error::new(input.span(), "a union has no state of its own")),
+    };
+    derived.unwrap_or_else(Error::into_compile_error).into()
+}
+
+fn part(field: &Field) -> Result<Part, Error> {
+    let mut part = Part::State;
+    for attribute in &field.attrs {
+        if attribute.path().is_ident("checkpoint") {
+            attribute.parse_nested_meta(|meta| {
+                part = match meta.path.get_ident().map(ToString::to_string).as_deref() {
+                    Some("fixed") => Part::Fixed,
+                    Some("each") => Part::Each,
+                    Some("with") => Part::With(meta.value()?.parse()?),
+                    _ => return Err(meta.error("allowed: fixed, each, with = path")),
+                };
+                Ok(())
+            })?;
+        }
+    }
+    Ok(part)
+}
+
+/// The generics with the bounds that the type asks for.
+fn bounded(input: &DeriveInput) -> Result<Generics, Error> {
+    let mut generics = input.generics.clone();
+    for attribute in &input.attrs {
+        if attribute.path().is_ident("checkpoint") {
+            attribute.parse_nested_meta(|meta| {
+                if !meta.path.is_ident("bound") {
+                    return Err(meta.error("allowed: bound = \"T: Bound\""));
+                }
+                let text: syn::LitStr = meta.value()?.parse()?;
+                let bound: syn::WherePredicate = text.parse()?;
+                generics.make_where_clause().predicates.push(bound);
+                Ok(())
+            })?;
+        }
+    }
+    Ok(generics)
+}
+
+fn members(fields: &Fields) -> Vec<Member> {
+    let member = |(place, field): (usize, &Field)| match &field.ident {
+        Some(name) => Member::Named(name.clone()),
+        None => Member::Unnamed(Index::from(place)),
+    };
+    fields.iter().enumerate().map(member).collect()
+}
+
+/// FNV-1a of a type's name and its fields: by it a reader knows that they are still the same.
+fn mark(input: &DeriveInput, fields: &Fields) -> Result<u32, Error> {
+    let mut text = input.ident.to_string();
+    for (field, member) in fields.iter().zip(members(fields)) {
+        if !matches!(part(field)?, Part::Fixed) {
+            text.push_str(&format!(" {}", quote!(#member)));
+        }
+    }
+    let hashed = text.bytes().fold(0x811c_9dc5_u32, |hash, byte| {
+        (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+    });
+    Ok(hashed)
+}
+
+fn save_of(part: &Part, of: &Tokens) -> Tokens {
+    match part {
+        Part::State => quote!(vigil_checkpoint::Checkpoint::save(#of, to);),
+        Part::Fixed => quote!(),
+        Part::Each => quote!(vigil_checkpoint::save_each(#of.iter(), to);),
+        Part::With(path) => quote!(#path::save(#of, to);),
+    }
+}
+
+fn load_of(part: &Part, of: &Tokens) -> Tokens {
+    match part {
+        Part::State => quote!(vigil_checkpoint::Checkpoint::load(#of, from);),
+        Part::Fixed => quote!(),
+        Part::Each => quote!(vigil_checkpoint::load_each(#of.iter_mut(), from);),
+        Part::With(path) => quote!(#path::load(#of, from);),
+    }
+}
+
+fn in_place_struct(input: &DeriveInput, fields: &Fields) -> Result<Tokens, Error> {
+    let (mut saves, mut loads) = (Vec::new(), Vec::new());
+    for (field, member) in fields.iter().zip(members(fields)) {
+        let part = part(field)?;
+        saves.push(save_of(&part, &quote!((&self.#member))));
+        loads.push(load_of(&part, &quote!((&mut self.#member))));
+    }
+    let (name, text, mark) = (&input.ident, input.ident.to_string(), mark(input, fields)?);
+    let generics = bounded(input)?;
+    let (of, types, bounds) = generics.split_for_impl();
+    Ok(quote! {
+        impl #of vigil_checkpoint::Checkpoint for #name #types #bounds {
+            fn save(&self, to: &mut vigil_checkpoint::CheckpointWriter<'_>) {
+                to.mark(#mark);
+                #(#saves)*
+            }
+            fn load(&mut self, from: &mut vigil_checkpoint::CheckpointReader<'_>) {
+                from.expect(#mark, #text);
+                #(#loads)*
+            }
+        }
+    })
+}
+
+fn in_place_enum<'a>(
+    input: &DeriveInput,
+    variants: impl Iterator<Item = &'a syn::Variant>,
+) -> Result<Tokens, Error> {
+    let (name, text) = (&input.ident, input.ident.to_string());
+    let (mut saves, mut loads) = (Vec::new(), Vec::new());
+    for (tag, variant) in variants.enumerate() {
+        let variant_name = &variant.ident;
+        let members = members(&variant.fields);
+        let names: Vec<_> = (0..members.len())
+            .map(|i| format_ident!("field_{i}"))
+            .collect();
+        let mark = mark(input, &variant.fields)? ^ tag as u32;
+        let (mut save, mut load) = (Vec::new(), Vec::new());
+        for (field, name) in variant.fields.iter().zip(&names) {
+            let part = part(field)?;
+            save.push(save_of(&part, &quote!(#name)));
+            load.push(load_of(&part, &quote!(#name)));
+        }
+        let pattern = quote!(Self::#variant_name { #(#members: #names),* });
+        saves.push(quote!(#pattern => { to.mark(#mark); #(#save)* }));
+        loads.push(quote!(#pattern => { from.expect(#mark, #text); #(#load)* }));
+    }
+    let generics = bounded(input)?;
+    let (of, types, bounds) = generics.split_for_impl();
+    Ok(quote! {
+        impl #of vigil_checkpoint::Checkpoint for #name #types #bounds {
+            #[allow(unused_variables)]
+            fn save(&self, to: &mut vigil_checkpoint::CheckpointWriter<'_>) {
+                match self { #(#saves)* }
+            }
+            #[allow(unused_variables)]
+            fn load(&mut self, from: &mut vigil_checkpoint::CheckpointReader<'_>) {
+                match self { #(#loads)* }
+            }
+        }
+    })
+}
+
+fn value_struct(input: &DeriveInput, fields: &Fields) -> Result<Tokens, Error> {
+    let in_place = in_place_struct(input, fields)?;
+    let members = members(fields);
+    for field in fields {
+        if !matches!(part(field)?, Part::State) {
+            return Err(Error::new(field.span(), "a value has no fixed parts"));
+        }
+    }
+    let (name, text, mark) = (&input.ident, input.ident.to_string(), mark(input, fields)?);
+    let generics = bounded(input)?;
+    let (of, types, bounds) = generics.split_for_impl();
+    Ok(quote! {
+        #in_place
+        impl #of vigil_checkpoint::CheckpointValue for #name #types #bounds {
+            fn read(from: &mut vigil_checkpoint::CheckpointReader<'_>) -> Self {
+                from.expect(#mark, #text);
+                Self { #(#members: vigil_checkpoint::CheckpointValue::read(from)),* }
+            }
+        }
+    })
+}
+
+fn value_enum<'a>(
+    input: &DeriveInput,
+    variants: impl Iterator<Item = &'a syn::Variant>,
+) -> Result<Tokens, Error> {
+    let (name, text) = (&input.ident, input.ident.to_string());
+    let (mut saves, mut reads) = (Vec::new(), Vec::new());
+    for (tag, variant) in variants.enumerate() {
+        let (variant_name, tag) = (&variant.ident, tag as u32);
+        let members = members(&variant.fields);
+        let names: Vec<_> = (0..members.len())
+            .map(|i| format_ident!("field_{i}"))
+            .collect();
+        saves.push(quote! {
+            Self::#variant_name { #(#members: #names),* } => {
+                to.mark(#tag);
+                #(vigil_checkpoint::Checkpoint::save(#names, to);)*
+            }
+        });
+        let read = quote! {
+            Self::#variant_name { #(#members: vigil_checkpoint::CheckpointValue::read(from)),* }
+        };
+        // The first is also what a reader that has failed gives.
+        reads.push(match tag {
+            0 => quote!(_ => #read,),
+            _ => quote!(#tag => #read,),
+        });
+    }
+    let count = reads.len();
+    reads.rotate_left(1.min(count));
+    let count = count as u32;
+    let generics = bounded(input)?;
+    let (of, types, bounds) = generics.split_for_impl();
+    Ok(quote! {
+        impl #of vigil_checkpoint::Checkpoint for #name #types #bounds {
+            #[allow(unused_variables)]
+            fn save(&self, to: &mut vigil_checkpoint::CheckpointWriter<'_>) {
+                match self { #(#saves)* }
+            }
+            fn load(&mut self, from: &mut vigil_checkpoint::CheckpointReader<'_>) {
+                *self = vigil_checkpoint::CheckpointValue::read(from);
+            }
+        }
+        impl #of vigil_checkpoint::CheckpointValue for #name #types #bounds {
+            fn read(from: &mut vigil_checkpoint::CheckpointReader<'_>) -> Self {
+                match from.variant(#count, #text) { #(#reads)* }
+            }
+        }
+    })
+}
