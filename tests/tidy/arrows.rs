@@ -82,6 +82,7 @@ const TOOLS: &[&str] = &[
     "vigil-import",
     "vigil-missions",
     "vigil-lab",
+    "vigil-ros2",
     "vigil",
 ];
 
