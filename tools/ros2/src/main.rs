@@ -111,3 +111,21 @@ fn wait(graph: &str) -> Option<RunningGraph> {
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use clap::CommandFactory;
+
+    use super::Args;
+
+    #[test]
+    fn vigil_names_every_option() {
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../vigil/src/ros2.rs");
+        let source = std::fs::read_to_string(source).unwrap();
+        for option in Args::command().get_opts().filter_map(|it| it.get_long()) {
+            assert!(source.contains(&format!("`--{option}")), "--{option}");
+        }
+    }
+}

@@ -12,12 +12,11 @@ const BUILD: &str = "--manifest-path tools/ros2/Cargo.toml --target-dir target";
 /// Publishes what a running graph says as topics of ROS 2: faults, beliefs, decisions, services.
 ///
 /// It becomes `vigil-ros2`, which has a build of its own: `cargo build --release --manifest-path
-/// tools/ros2/Cargo.toml --target-dir target`. `vigil ros2 --help` lists its options once it is
-/// built.
+/// tools/ros2/Cargo.toml --target-dir target`. Options, as `vigil-ros2 --help` explains them:
+/// `--graph NAME`, `--domain N`, `--all`, `--rate HZ`, `--address IP`, `--humble`, `--once`.
 #[derive(Debug, clap::Args)]
-#[command(disable_help_flag = true)]
 pub struct Args {
-    /// Options of `vigil-ros2`, such as `--graph NAME`, `--domain N`, `--all`.
+    /// Options of `vigil-ros2`.
     #[arg(
         trailing_var_arg = true,
         allow_hyphen_values = true,
