@@ -162,11 +162,12 @@ impl LiveMessages {
     pub fn look<E>(&mut self, now_ns: u64, send: MessageTaker<'_, E>) -> Result<(), E> {
         self.output.clock = WallClock::now();
         let mut silent = Vec::new();
-        if self.faults.is_due(now_ns) {
-            silent.push(Speaker::Faults);
-        }
+        // What is named first, for it is told with the faults.
         if self.diagnosis.is_due(now_ns) {
             silent.push(Speaker::Diagnosis);
+        }
+        if self.faults.is_due(now_ns) {
+            silent.push(Speaker::Faults);
         }
         for service in ServiceName::ALL {
             if self.health[service.index()].is_due(now_ns) {
@@ -182,7 +183,7 @@ impl LiveMessages {
     /// Those of `send`.
     pub fn end<E>(&mut self, why: &str, now_ns: u64, send: MessageTaker<'_, E>) -> Result<(), E> {
         let services = ServiceName::ALL.map(Speaker::Health);
-        let all = [&[Speaker::Faults, Speaker::Diagnosis][..], &services].concat();
+        let all = [&[Speaker::Diagnosis, Speaker::Faults][..], &services].concat();
         self.tell(&all, why, now_ns, send)
     }
 
@@ -196,7 +197,7 @@ impl LiveMessages {
         let output = &mut self.output;
         let times = MessageTimes::at(output.clock.unix_ns(now_ns));
         let sink = &mut LiveSink { output, send };
-        let translation = &self.translation;
+        let translation = &mut self.translation;
         let mut speakers = silent.iter();
         speakers.try_for_each(|of| translation.write_stale(*of, why, times, sink))
     }

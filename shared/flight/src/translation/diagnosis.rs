@@ -7,25 +7,20 @@ use vigil_setup::Setup;
 use super::Outcome;
 use super::explanation::Explanation;
 use crate::message_times::MessageTimes;
-use crate::messages::diagnostics::{Diagnostics, Level, Status};
-use crate::messages::header::Header;
+use crate::messages::diagnostics::{Level, Status};
 use crate::messages::joint_state::JointState;
-use crate::pace::Pace;
 use crate::sink::Sink;
 use crate::topics;
 
-/// Shortest time between two statuses that name the same, ns.
-const STATUS_NS: u64 = 500_000_000;
 /// Name of the status.
 const NAME: &str = "diagnosis";
 
-/// Names of the fault tree, and of the graph.
+/// Names of the fault tree, and the newest belief.
 pub(crate) struct DiagnosisTranslation {
-    graph: String,
     tree: FaultTree,
     robot: Description,
     names: Vec<String>,
-    pace: Pace,
+    newest: Option<Box<FaultBelief>>,
 }
 
 impl DiagnosisTranslation {
@@ -33,11 +28,10 @@ impl DiagnosisTranslation {
         let nodes = setup.tree.nodes().iter().map(|node| node.name.clone());
         let unknown = mode_word(MODE_UNKNOWN).map(str::to_owned);
         Self {
-            graph: setup.file.graph.name.clone(),
             tree: setup.tree.clone(),
             robot: setup.robot.clone(),
             names: nodes.chain(unknown).collect(),
-            pace: Pace::every_ns(STATUS_NS),
+            newest: None,
         }
     }
 
@@ -55,38 +49,24 @@ impl DiagnosisTranslation {
         let values: Vec<f64> = nodes.chain([belief.p_unknown]).collect();
         let state = JointState::named(times.capture_ns, &self.names, &values);
         sink.write(&topics::BELIEF, times, &state)?;
-        if self.pace.is_due(times.log_ns, belief.reported.into()) {
-            self.send(self.status(belief), times, sink)?;
-        }
+        self.newest = Some(Box::new(*belief));
         Ok(Outcome::Messages)
     }
 
-    /// Writes that nothing of it is known any more.
-    pub(crate) fn write_stale<S: Sink>(
-        &self,
-        why: &str,
-        times: MessageTimes,
-        sink: &mut S,
-    ) -> Result<(), S::Error> {
-        self.send(Status::stale(NAME, why), times, sink)
+    /// Nothing is heard any more.
+    pub(crate) fn forget(&mut self) {
+        self.newest = None;
     }
 
-    fn send<S: Sink>(
-        &self,
-        status: Status,
-        times: MessageTimes,
-        sink: &mut S,
-    ) -> Result<(), S::Error> {
-        let diagnostics = Diagnostics {
-            header: Header::at(times.capture_ns),
-            graph: &self.graph,
-            statuses: &[status],
-        };
-        sink.write(&topics::DIAGNOSTICS, times, &diagnostics)
+    /// What the newest belief names.
+    pub(crate) fn status(&self) -> Status {
+        let newest = self.newest.as_deref();
+        let unknown = || Status::stale(NAME, "nothing is heard");
+        newest.map_or_else(unknown, |belief| self.named(belief))
     }
 
     /// The reported mode, why it is that, and the most probable set.
-    fn status(&self, belief: &FaultBelief) -> Status {
+    fn named(&self, belief: &FaultBelief) -> Status {
         let level = match belief.reported {
             0 => Level::Ok,
             MODE_UNKNOWN => Level::Warn,

@@ -43,10 +43,12 @@ impl FaultsTranslation {
         }
     }
 
-    /// Writes what is known of faults. One that is kept no longer is told to be over, once.
+    /// Writes what is known of faults, and `diagnosis` besides. A fault that is kept no longer is
+    /// told to be over, once.
     pub(crate) fn write<S: Sink>(
         &mut self,
         faults: &Faults,
+        diagnosis: impl FnOnce() -> Status,
         times: MessageTimes,
         sink: &mut S,
     ) -> Result<Outcome, S::Error> {
@@ -71,7 +73,7 @@ impl FaultsTranslation {
             values: Vec::new(),
         });
         statuses.extend(over);
-        self.send(&statuses, times, sink)?;
+        self.send(statuses, diagnosis(), times, sink)?;
         Ok(Outcome::Messages)
     }
 
@@ -79,27 +81,33 @@ impl FaultsTranslation {
     pub(crate) fn write_stale<S: Sink>(
         &self,
         why: &str,
+        diagnosis: Status,
         times: MessageTimes,
         sink: &mut S,
     ) -> Result<(), S::Error> {
         let faults = self.told.iter().map(|name| Status::stale(name, why));
-        let statuses: Vec<Status> = [Status::stale("", why)].into_iter().chain(faults).collect();
-        self.send(&statuses, times, sink)
+        let statuses = [Status::stale("", why)].into_iter().chain(faults);
+        self.send(statuses.collect(), diagnosis, times, sink)
     }
 
     fn send<S: Sink>(
         &self,
-        statuses: &[Status],
+        mut statuses: Vec<Status>,
+        diagnosis: Status,
         times: MessageTimes,
         sink: &mut S,
     ) -> Result<(), S::Error> {
-        let diagnostics = Diagnostics {
+        sink.write(&topics::FAULTS, times, &self.array(&statuses, times))?;
+        statuses.insert(1, diagnosis);
+        sink.write(&topics::DIAGNOSTICS, times, &self.array(&statuses, times))
+    }
+
+    fn array<'a>(&'a self, statuses: &'a [Status], times: MessageTimes) -> Diagnostics<'a> {
+        Diagnostics {
             header: Header::at(times.capture_ns),
             graph: &self.graph,
             statuses,
-        };
-        sink.write(&topics::FAULTS, times, &diagnostics)?;
-        sink.write(&topics::DIAGNOSTICS, times, &diagnostics)
+        }
     }
 }
 

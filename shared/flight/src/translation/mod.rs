@@ -119,9 +119,10 @@ impl Translation {
             Topic::Action => {
                 read(topic, bytes, sink)?.map(|it| self.action.write(&it.block, it.times, sink))
             }
-            Topic::Faults => {
-                read(topic, bytes, sink)?.map(|it| self.faults.write(&it.block, it.times, sink))
-            }
+            Topic::Faults => read(topic, bytes, sink)?.map(|it| {
+                let diagnosis = || self.diagnosis.status();
+                self.faults.write(&it.block, diagnosis, it.times, sink)
+            }),
             Topic::Truth => {
                 read(topic, bytes, sink)?.map(|it| all(write_truth(&it.block, it.times, sink)))
             }
@@ -139,15 +140,21 @@ impl Translation {
 
     /// Writes that nothing is heard of a part any more, and why.
     pub(crate) fn write_stale<S: Sink>(
-        &self,
+        &mut self,
         speaker: Speaker,
         why: &str,
         times: MessageTimes,
         sink: &mut S,
     ) -> Result<(), S::Error> {
         match speaker {
-            Speaker::Faults => self.faults.write_stale(why, times, sink),
-            Speaker::Diagnosis => self.diagnosis.write_stale(why, times, sink),
+            Speaker::Diagnosis => {
+                self.diagnosis.forget();
+                Ok(())
+            }
+            Speaker::Faults => {
+                let diagnosis = self.diagnosis.status();
+                self.faults.write_stale(why, diagnosis, times, sink)
+            }
             Speaker::Health(service) => self.health.write_stale(service, why, times, sink),
         }
     }
