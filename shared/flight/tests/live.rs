@@ -12,10 +12,7 @@ use vigil_flight::LiveMessages;
 use vigil_setup::Setup;
 
 const S: u64 = 1_000_000_000;
-/// Levels of ROS 2.
-const OK: u8 = 0;
-const ERROR: u8 = 2;
-const STALE: u8 = 3;
+const SILENT: Option<&str> = Some("stale: nothing is heard");
 
 fn setup() -> Setup {
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/rover.toml");
@@ -52,14 +49,16 @@ impl Heard {
         sent.unwrap();
     }
 
-    /// Level of the status of this name in the last message of a topic.
-    fn level(&self, topic: &str, name: &str) -> Option<u8> {
+    /// What the status of this name says in the last message of a topic.
+    fn said(&self, topic: &str, name: &str) -> Option<&str> {
         let mut of_topic = self.messages.iter().filter(|(at, _)| *at == topic);
         let (_, cdr) = of_topic.next_back()?;
         let text = [name.as_bytes(), b"\0"].concat();
         let at = cdr.windows(text.len()).position(|it| it == text)?;
-        // The length lies before the name, and before it the level with its padding.
-        Some(cdr[at - 8])
+        // Its length comes first, at a multiple of four.
+        let message = &cdr[(at + text.len()).next_multiple_of(4) + 4..];
+        let end = message.iter().position(|byte| *byte == 0)?;
+        std::str::from_utf8(&message[..end]).ok()
     }
 }
 
@@ -100,23 +99,19 @@ fn a_fault_is_told_until_it_is_over_and_silence_is_stale() {
         heard.block(messages, Topic::Faults, &present, 2 * S);
     });
     for topic in ["/diagnostics", "/vigil/faults"] {
-        assert_eq!(heard.level(topic, whole), Some(ERROR));
-        assert_eq!(heard.level(topic, fault), Some(ERROR));
+        assert_eq!(heard.said(topic, whole), Some("fault"));
+        assert_eq!(heard.said(topic, fault), Some("active (fault), p 0.00"));
     }
-    assert_eq!(
-        heard.level("/diagnostics", "vigil/rover/diagnosis"),
-        Some(STALE)
-    );
+    assert_eq!(heard.said("/diagnostics", "vigil/rover/diagnosis"), SILENT);
 
     heard.take(&mut messages, |messages, heard| heard.look(messages, 4 * S));
-    assert_eq!(heard.level("/diagnostics", whole), Some(STALE));
-    assert_eq!(heard.level("/diagnostics", fault), Some(STALE));
-    let service = "vigil/rover/health/detector";
-    assert_eq!(
-        heard.level("/vigil/health", service),
-        None,
-        "the last is another"
-    );
+    assert_eq!(heard.said("/diagnostics", whole), SILENT);
+    assert_eq!(heard.said("/diagnostics", fault), SILENT);
+    let services = heard
+        .messages
+        .iter()
+        .filter(|(at, _)| *at == "/vigil/health");
+    assert_eq!(services.count(), 4);
     heard.take(&mut messages, |messages, heard| {
         heard.look(messages, 4 * S + 1)
     });
@@ -124,12 +119,12 @@ fn a_fault_is_told_until_it_is_over_and_silence_is_stale() {
 
     // After a new start the fault is kept no longer: it is over, once.
     let mut messages = messages.restarted(&setup, 5 * S);
-    for (seq, level) in [(6, Some(OK)), (7, None)] {
+    for (seq, said) in [(6, Some("over, and kept no longer")), (7, None)] {
         let gone = faults(&setup, OverallState::Ok, None, seq);
         heard.take(&mut messages, |messages, heard| {
             heard.block(messages, Topic::Faults, &gone, seq * S);
         });
-        assert_eq!(heard.level("/diagnostics", whole), Some(OK));
-        assert_eq!(heard.level("/diagnostics", fault), level);
+        assert_eq!(heard.said("/diagnostics", whole), Some("ok"));
+        assert_eq!(heard.said("/diagnostics", fault), said);
     }
 }
