@@ -21,11 +21,11 @@ fn setup() -> Setup {
 
 /// What came, by topic.
 #[derive(Default)]
-struct Heard {
+struct Inbox {
     messages: Vec<(&'static str, Vec<u8>)>,
 }
 
-impl Heard {
+impl Inbox {
     /// Hands `act` who takes messages.
     fn take(&mut self, messages: &mut LiveMessages, act: impl Fn(&mut LiveMessages, &mut Self)) {
         self.messages.clear();
@@ -92,7 +92,7 @@ fn faults(setup: &Setup, overall: OverallState, state: Option<FaultState>, seq: 
 fn a_fault_is_told_until_it_is_over_and_silence_is_stale() {
     let setup = setup();
     let mut messages = LiveMessages::new(&setup, S / 10, S);
-    let mut heard = Heard::default();
+    let mut heard = Inbox::default();
     let (whole, fault) = ("vigil/rover", "vigil/rover/INPUT");
     let present = faults(&setup, OverallState::Fault, Some(FaultState::Active), 2);
     heard.take(&mut messages, |messages, heard| {
