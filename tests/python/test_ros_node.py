@@ -216,7 +216,7 @@ class VerdictsBack(NodeTest):
             self.ros.pass_time(0.02)
             (first,) = self.statuses()
             self.assertEqual((first.level, first.message), (report.STALE, "no verdict yet; the robot is to stop"))
-            self.assertEqual((first.name, first.hardware_id), (f"vigil_bridge: {graph.address}", graph.address))
+            self.assertEqual((first.name, first.hardware_id), (f"vigil/{graph.address}/vigil_bridge", graph.address))
             fault = dict(alarm=1, mode=4, mode_name=b"LF_STUCK", p_mode=0.99)
             self.hear(graph, verdict(valid_for_ns=10**10))
             self.hear(graph, verdict(vigil.RECOVERY_STOP, valid_for_ns=10**10, action_name=b"stop", **fault))

@@ -150,7 +150,7 @@ class Diagnostics(unittest.TestCase):
             (report.ERROR, r"LF_STUCK p=0.97: bend", verdict(vigil.RECOVERY_COMPENSATE, action_name=b"bend", **named)),
             (report.ERROR, "LF_STUCK", verdict(**named)),
             (report.ERROR, "no alarm: stop", verdict(stop, action_name=b"stop")),
-            (report.ERROR, r"blind \(command\): go_on", verdict(blind=5, mode=1002, mode_name=b"BLIND")),
+            (report.STALE, r"blind \(command\): go_on", verdict(blind=5, mode=1002, mode_name=b"BLIND")),
             (report.ERROR, "cannot be obeyed: unknown-kind", verdict(77)),
             (report.ERROR, "cannot be obeyed: not-finite", verdict(speed_scale=math.nan)),
             (report.STALE, "no valid verdict: nothing", verdict(vigil.RECOVERY_NONE)),
@@ -167,7 +167,7 @@ class Diagnostics(unittest.TestCase):
         size = dict(size=0.62, size_sd=0.03, size_kind=vigil.SIZE_GAIN)
         one = verdict(alarm=1, mode=4, mode_name=b"LF_GAIN", p_mode=0.9, p_fault=0.99, alarm_count=2, stuck_wheels=8, **size)
         values = dict(self.status(one)[2])
-        wanted = {"graph": "left", "not measured": "enc_LF", "mode": "LF_GAIN", "probability": "0.900"}
+        wanted = {"graph": "left", "not measured": "enc_LF", "mode": "LF_GAIN", "probability": "0.9000"}
         wanted |= {"runner-up": "LF_STUCK", "size": "gain 0.62 sd 0.03", "action": "go_on", "kind of action": "go_on"}
         wanted |= {"p_fault": "0.990", "alarm": "yes", "alarms": "2", "blind": "no", "decision": "7"}
         wanted |= {"stuck wheels": "3", "broken encoders": "none"}

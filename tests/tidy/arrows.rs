@@ -83,6 +83,7 @@ const TOOLS: &[&str] = &[
     "vigil-import",
     "vigil-missions",
     "vigil-lab",
+    "vigil-ros2",
     "vigil",
 ];
 

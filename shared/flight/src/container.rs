@@ -14,6 +14,7 @@ use crate::error::FlightError;
 use crate::message_times::MessageTimes;
 use crate::messages::message::Message;
 use crate::summary::FlightSummary;
+use crate::topics::RosTopic;
 
 /// Longest recorded time in a chunk, ns: what an interruption takes with it at most.
 const CHUNK_NS: u64 = 1_000_000_000;
@@ -121,22 +122,22 @@ impl Container {
     }
 
     /// Writes a message of ROS 2.
-    pub(crate) fn write<M: Message>(
+    pub(crate) fn write(
         &mut self,
-        topic: &str,
+        topic: &RosTopic,
         times: MessageTimes,
-        message: &M,
+        message: &impl Message,
     ) -> Result<(), FlightError> {
         let mut cdr = std::mem::replace(&mut self.cdr, Cdr::new());
         cdr.clear();
         message.encode(&mut cdr);
         let form = || ChannelForm {
             message_encoding: "cdr",
-            type_name: M::DEFINITION.name,
-            definition: M::DEFINITION.text(),
+            type_name: topic.definition.name,
+            definition: topic.definition.text(),
             notes: BTreeMap::new(),
         };
-        let written = self.write_bytes(topic, times, cdr.bytes(), form);
+        let written = self.write_bytes(topic.name, times, cdr.bytes(), form);
         self.cdr = cdr;
         written
     }

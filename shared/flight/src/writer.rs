@@ -4,34 +4,36 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use vigil_blocks::Block;
 use vigil_blocks::layout::Layout;
-use vigil_blocks::{Block, CheckpointPart, Control, Journal, ParticleBlock};
 use vigil_cycle::topic::Topic;
 use vigil_setup::Setup;
 use vigil_timeline::{TimelineEntry, WallClock};
 
-use crate::block_bytes::{block_header, read_block};
+use crate::block_bytes::block_header;
 use crate::container::{ChannelForm, Container, FOREIGN, RAW};
 use crate::error::FlightError;
 use crate::message_times::MessageTimes;
+use crate::messages::message::Message;
+use crate::sink::Sink;
 use crate::summary::FlightSummary;
-use crate::translation::{Outcome, Translation, write_event, write_truth};
+use crate::topics::RosTopic;
+use crate::translation::{Outcome, Translation, write_event};
 
 /// Writes what a graph published as an MCAP file.
 ///
 /// The file has `.part` after its name until [`Self::finish`]. What was written up to the last
 /// second of recorded time can be read from it, whatever happens to the process.
 pub struct FlightWriter {
-    file: Container,
+    file: BlockFile,
     translation: Translation,
-    clock: WallClock,
     raw_only: u64,
 }
 
-/// A block that can be read, and when it was.
-struct ReadBlock<B> {
-    block: B,
-    times: MessageTimes,
+/// The file with what its blocks are of.
+struct BlockFile {
+    container: Container,
+    clock: WallClock,
 }
 
 /// What a block consists of, a line for each field.
@@ -53,6 +55,46 @@ const fn block_form(type_name: &'static str, notes: BTreeMap<String, String>) ->
     }
 }
 
+impl Sink for BlockFile {
+    type Error = FlightError;
+
+    fn clock(&self) -> &WallClock {
+        &self.clock
+    }
+
+    fn keep<B: Block + Layout>(
+        &mut self,
+        topic: Topic,
+        bytes: &[u8],
+    ) -> Result<Option<MessageTimes>, FlightError> {
+        let name = topic.name();
+        let file = &mut self.container;
+        let Some(header) = block_header::<B>(bytes) else {
+            // Nothing says when it was, so it is put after what came before it.
+            let times = MessageTimes::at(file.last_ns().unwrap_or_else(unix_now_ns));
+            let topic = format!("{FOREIGN}{name}");
+            let form = || block_form("", BTreeMap::new());
+            file.write_bytes(&topic, times, bytes, form)?;
+            return Ok(None);
+        };
+        let times = MessageTimes::new(&header, &self.clock);
+        let topic = format!("{RAW}{name}");
+        let layout = || BTreeMap::from([("layout".to_owned(), layout_text::<B>())]);
+        let form = || block_form(B::TYPE_NAME, layout());
+        file.write_bytes(&topic, times, bytes, form)?;
+        Ok(Some(times))
+    }
+
+    fn write(
+        &mut self,
+        topic: &'static RosTopic,
+        times: MessageTimes,
+        message: &impl Message,
+    ) -> Result<(), FlightError> {
+        self.container.write(topic, times, message)
+    }
+}
+
 impl FlightWriter {
     /// Begins a file of `graph`, whose models give everything its name. `clock` says what the
     /// calendar said while the graph ran.
@@ -61,9 +103,11 @@ impl FlightWriter {
     /// The file cannot be created.
     pub fn create(path: &Path, graph: &Setup, clock: WallClock) -> Result<Self, FlightError> {
         Ok(Self {
-            file: Container::create(path)?,
+            file: BlockFile {
+                container: Container::create(path)?,
+                clock,
+            },
             translation: Translation::new(graph),
-            clock,
             raw_only: 0,
         })
     }
@@ -74,93 +118,11 @@ impl FlightWriter {
     /// # Errors
     /// The file cannot be written.
     pub fn block(&mut self, topic: Topic, bytes: &[u8]) -> Result<(), FlightError> {
-        let outcome = match topic {
-            Topic::Sensor => self.read(topic, bytes)?.map(|it| {
-                let file = &mut self.file;
-                self.translation.frame.write(&it.block, it.times, file)
-            }),
-            Topic::Detection => self.read(topic, bytes)?.map(|it| {
-                let file = &mut self.file;
-                let written = self.translation.detection.write(&it.block, it.times, file);
-                written.map(|()| Outcome::Messages)
-            }),
-            Topic::Diagnosis => self.read(topic, bytes)?.map(|it| {
-                let file = &mut self.file;
-                self.translation.diagnosis.write(&it.block, it.times, file)
-            }),
-            Topic::Action => self.read(topic, bytes)?.map(|it| {
-                let file = &mut self.file;
-                self.translation.action.write(&it.block, it.times, file)
-            }),
-            Topic::Faults => self.read(topic, bytes)?.map(|it| {
-                let file = &mut self.file;
-                self.translation.faults.write(&it.block, it.times, file)
-            }),
-            Topic::Truth => self.read(topic, bytes)?.map(|it| {
-                let written = write_truth(&it.block, it.times, &mut self.file);
-                written.map(|()| Outcome::Messages)
-            }),
-            Topic::Health(service) => self.read(topic, bytes)?.map(|it| {
-                let (health, file) = (&mut self.translation.health, &mut self.file);
-                let written = health.write(service, &it.block, it.times, file);
-                written.map(|()| Outcome::Messages)
-            }),
-            Topic::DetectionParticles | Topic::DiagnosisParticles => {
-                let times = self.keep::<ParticleBlock>(topic, bytes)?;
-                times.map(|_| Ok(Outcome::Messages))
-            }
-            Topic::Control(_) => {
-                let times = self.keep::<Control>(topic, bytes)?;
-                times.map(|_| Ok(Outcome::Messages))
-            }
-            Topic::Journal(_) => {
-                let times = self.keep::<Journal>(topic, bytes)?;
-                times.map(|_| Ok(Outcome::Messages))
-            }
-            Topic::Checkpoint(_) => {
-                let times = self.keep::<CheckpointPart>(topic, bytes)?;
-                times.map(|_| Ok(Outcome::Messages))
-            }
-        };
-        if outcome.transpose()? != Some(Outcome::Messages) {
+        let outcome = self.translation.write(topic, bytes, &mut self.file)?;
+        if outcome != Outcome::Messages {
             self.raw_only += 1;
         }
         Ok(())
-    }
-
-    /// Keeps a block as it is, and reads it; `None` if it is something else.
-    fn read<B: Block + Layout>(
-        &mut self,
-        topic: Topic,
-        bytes: &[u8],
-    ) -> Result<Option<ReadBlock<B>>, FlightError> {
-        let times = self.keep::<B>(topic, bytes)?;
-        Ok(times
-            .zip(read_block(bytes))
-            .map(|(times, block)| ReadBlock { block, times }))
-    }
-
-    /// Keeps a block as it is, and says when it was; `None` if it is something else.
-    fn keep<B: Block + Layout>(
-        &mut self,
-        topic: Topic,
-        bytes: &[u8],
-    ) -> Result<Option<MessageTimes>, FlightError> {
-        let name = topic.name();
-        let Some(header) = block_header::<B>(bytes) else {
-            // Nothing says when it was, so it is put after what came before it.
-            let times = MessageTimes::at(self.file.last_ns().unwrap_or_else(unix_now_ns));
-            let topic = format!("{FOREIGN}{name}");
-            let form = || block_form("", BTreeMap::new());
-            self.file.write_bytes(&topic, times, bytes, form)?;
-            return Ok(None);
-        };
-        let times = MessageTimes::new(&header, &self.clock);
-        let topic = format!("{RAW}{name}");
-        let layout = || BTreeMap::from([("layout".to_owned(), layout_text::<B>())]);
-        let form = || block_form(B::TYPE_NAME, layout());
-        self.file.write_bytes(&topic, times, bytes, form)?;
-        Ok(Some(times))
     }
 
     /// Adds an event.
@@ -168,7 +130,17 @@ impl FlightWriter {
     /// # Errors
     /// The file cannot be written.
     pub fn event(&mut self, entry: &TimelineEntry) -> Result<(), FlightError> {
-        write_event(entry, &self.clock, &mut self.file)
+        let times = write_event(entry, &mut self.file)?;
+        // An entry is made of numbers and texts, which always have a form in JSON.
+        let json = serde_json::to_vec(entry).unwrap_or_default();
+        let form = || ChannelForm {
+            message_encoding: "json",
+            type_name: "",
+            definition: String::new(),
+            notes: BTreeMap::new(),
+        };
+        let file = &mut self.file.container;
+        file.write_bytes("/vigil/raw/events", times, &json, form)
     }
 
     /// Adds a file within the file, such as the graph's configuration.
@@ -181,7 +153,9 @@ impl FlightWriter {
         media_type: &str,
         bytes: &[u8],
     ) -> Result<(), FlightError> {
-        self.file.attach(name, media_type, bytes, unix_now_ns())
+        self.file
+            .container
+            .attach(name, media_type, bytes, unix_now_ns())
     }
 
     /// Adds named texts, such as why the file was written.
@@ -193,7 +167,7 @@ impl FlightWriter {
         name: &str,
         texts: &BTreeMap<String, String>,
     ) -> Result<(), FlightError> {
-        self.file.metadata(name, texts)
+        self.file.container.metadata(name, texts)
     }
 
     /// Closes the chunk under way, so that readers of the partial file find all that was written.
@@ -201,7 +175,7 @@ impl FlightWriter {
     /// # Errors
     /// The file cannot be written.
     pub fn flush(&mut self) -> Result<(), FlightError> {
-        self.file.flush()
+        self.file.container.flush()
     }
 
     /// Ends the file, brings it to the disk and gives it its name. A file of that name is replaced.
@@ -211,7 +185,7 @@ impl FlightWriter {
     pub fn finish(self) -> Result<FlightSummary, FlightError> {
         Ok(FlightSummary {
             raw_only: self.raw_only,
-            ..self.file.finish()?
+            ..self.file.container.finish()?
         })
     }
 }

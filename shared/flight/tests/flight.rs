@@ -10,7 +10,7 @@ use bytemuck::bytes_of;
 use mcap::read::Options;
 use mcap::{Message, MessageStream, Summary};
 use vigil_blocks::{
-    Action, Block, DetectionBelief, FaultBelief, Header, Health, ParticleBlock, SensorFrame,
+    Action, Block, DetectionBelief, FaultBelief, Faults, Header, Health, ParticleBlock, SensorFrame,
 };
 use vigil_cycle::topic::{ServiceName, Topic};
 use vigil_flight::FlightWriter;
@@ -302,6 +302,12 @@ fn what_repeats_itself_is_thinned_out_and_changes_are_written_at_once() {
             ..FaultBelief::default()
         };
         flight.put(Topic::Diagnosis, &belief);
+        let faults = Faults {
+            header: header::<Faults>(t_ns),
+            tree_hash: flight.graph.tree.hash(),
+            ..Faults::default()
+        };
+        flight.put(Topic::Faults, &faults);
         let belief = DetectionBelief {
             header: header::<DetectionBelief>(t_ns),
             ..DetectionBelief::default()
@@ -310,7 +316,8 @@ fn what_repeats_itself_is_thinned_out_and_changes_are_written_at_once() {
     }
     let summary = flight.writer.finish().unwrap();
     assert_eq!(summary.messages["/vigil/health"], 2 * 3);
-    assert_eq!(summary.messages["/diagnostics"], 10);
+    assert_eq!(summary.messages["/diagnostics"], 2);
+    assert_eq!(summary.messages["/vigil/faults"], 2);
     assert_eq!(summary.messages["/vigil/belief"], 100);
     assert_eq!(summary.messages["/vigil/detection"], 100);
 }

@@ -8,15 +8,24 @@ use std::process::Command;
 
 use vigil_terminal::CommandError;
 
+/// A program in this one's folder.
+#[derive(Debug, Clone, Copy)]
+pub struct Program {
+    /// Its name.
+    pub name: &'static str,
+    /// What `cargo build` is to be told for it.
+    pub build: &'static str,
+}
+
 /// Becomes a program in this one's folder, with these words.
 ///
 /// # Errors
 /// What to build, if it is not there; why it cannot be executed.
 pub fn become_program(
-    name: &str,
+    program: Program,
     words: impl IntoIterator<Item = OsString>,
 ) -> Result<Infallible, CommandError> {
-    let program = program(name)?;
+    let program = path(program)?;
     let error = Command::new(&program).args(words).exec();
     Err(CommandError::failure(format!(
         "{}: {error}",
@@ -28,9 +37,9 @@ pub fn become_program(
 ///
 /// # Errors
 /// What to build, if it is not there.
-fn program(name: &str) -> Result<PathBuf, CommandError> {
+fn path(of: Program) -> Result<PathBuf, CommandError> {
     let here = std::env::current_exe().map_err(CommandError::failure)?;
-    let program = here.with_file_name(name);
+    let program = here.with_file_name(of.name);
     if program.is_file() {
         return Ok(program);
     }
@@ -39,7 +48,8 @@ fn program(name: &str) -> Result<PathBuf, CommandError> {
         false => " --release",
     };
     Err(CommandError::usage(format!(
-        "{} is not built: run `cargo build{release} -p {name}`",
-        program.display()
+        "{} is not built: run `cargo build{release} {}`",
+        program.display(),
+        of.build
     )))
 }

@@ -45,7 +45,11 @@ pub fn run(words: &[OsString]) -> Result<Outcome, CommandError> {
         let message = format!("'{command}' is no command; `vigil --help` lists them");
         return Err(CommandError::usage(message));
     }
-    match beside::become_program(PROGRAM, words.iter().cloned())? {}
+    let program = beside::Program {
+        name: PROGRAM,
+        build: "-p vigil-lab",
+    };
+    match beside::become_program(program, words.iter().cloned())? {}
 }
 
 #[cfg(test)]

@@ -19,6 +19,7 @@ mod print_types;
 mod publisher;
 mod record;
 mod recordings;
+mod ros2;
 mod run;
 mod schemas;
 mod shell;
@@ -59,6 +60,7 @@ enum Command {
     Inject(inject::Args),
     Snapshot(snapshot::Args),
     Recordings(recordings::Args),
+    Ros2(ros2::Args),
     Check(check::Args),
     #[command(mut_args(only_of_the_border))]
     CheckPublisher(check_publisher::Args),
@@ -104,6 +106,7 @@ fn main() -> ExitCode {
         Command::Inject(args) => inject::run(&args),
         Command::Snapshot(args) => snapshot::run(&args),
         Command::Recordings(args) => recordings::run(&args),
+        Command::Ros2(args) => ros2::run(&args),
         Command::Record(args) => record::run(&args),
         Command::PrintChannels(args) => print_channels::run(&args),
         Command::PrintTypes(args) => print_types::run(&args),

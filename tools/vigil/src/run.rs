@@ -11,5 +11,9 @@ use crate::beside;
 /// A program that is not there.
 pub fn run() -> Result<Outcome, CommandError> {
     let words = std::env::args_os().skip_while(|word| word != "run").skip(1);
-    match beside::become_program("vigil-launcher", words)? {}
+    let program = beside::Program {
+        name: "vigil-launcher",
+        build: "-p vigil-launcher",
+    };
+    match beside::become_program(program, words)? {}
 }

@@ -114,7 +114,7 @@ class Bridge:
         if (level, message) == self._told and now_s - self._told_s < DIAGNOSTICS_S:
             return
         self._told, self._told_s = (level, message), now_s
-        status = DiagnosticStatus(level=bytes([level]), name=f"{self.node.get_name()}: {self.settings.graph}")
+        status = DiagnosticStatus(level=bytes([level]), name=f"vigil/{self.settings.graph}/{self.node.get_name()}")
         status.message, status.hardware_id = message, self.settings.graph
         status.values = [KeyValue(key=key, value=value) for key, value in values]
         array = DiagnosticArray(status=[status])

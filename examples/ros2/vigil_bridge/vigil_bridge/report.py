@@ -1,4 +1,7 @@
-"""What a verdict says, as the fields of a diagnostic_msgs/DiagnosticStatus, and as JSON."""
+"""What a verdict says, as the fields of a diagnostic_msgs/DiagnosticStatus, and as JSON.
+
+Names, levels and keys are those of `vigil ros2` (docs/operation.md) where both say the same.
+"""
 
 import ctypes
 import json
@@ -50,7 +53,7 @@ def _judged(verdict):
     action, name = _text(verdict.action_name) or KINDS[verdict.kind], _text(verdict.mode_name)
     stands = verdict.kind in STANDING
     if verdict.blind:
-        return ERROR, f"blind ({_of(BLIND, verdict.blind)}): {action}"
+        return STALE, f"blind ({_of(BLIND, verdict.blind)}): {action}"
     is_named = 0 < verdict.mode < MODE_NO_FAULT
     if verdict.alarm:
         said = f"{name} p={verdict.p_mode:.2f}" if is_named else f"fault without a name ({name or 'unknown'})"
@@ -75,7 +78,7 @@ def _values(verdict):
     kind = KINDS.get(verdict.kind, str(verdict.kind))
     return [
         ("mode", _text(verdict.mode_name)),
-        ("probability", f"{verdict.p_mode:.3f}"),
+        ("probability", f"{verdict.p_mode:.4f}"),
         ("runner-up", _text(verdict.runner_up_name)),
         ("size", _size(verdict)),
         ("action", _text(verdict.action_name)),

@@ -1,7 +1,6 @@
 //! How several things are.
 
 use crate::cdr::Cdr;
-use crate::definitions::{DIAGNOSTIC_ARRAY, Definition};
 use crate::messages::header::Header;
 use crate::messages::message::Message;
 
@@ -23,33 +22,46 @@ pub(crate) enum Level {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Status {
     pub(crate) level: Level,
-    /// What it is about; viewers show it after `vigil: `.
+    /// What it is about, after `vigil/GRAPH/`; empty: the graph as a whole, `vigil/GRAPH`.
     pub(crate) name: String,
     pub(crate) message: String,
     /// Keys and values.
     pub(crate) values: Vec<(&'static str, String)>,
 }
 
+impl Status {
+    /// One that is not known, and why.
+    pub(crate) fn stale(name: &str, why: &str) -> Self {
+        Self {
+            level: Level::Stale,
+            name: name.to_owned(),
+            message: format!("stale: {why}"),
+            values: Vec::new(),
+        }
+    }
+}
+
 /// `diagnostic_msgs/msg/DiagnosticArray`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Diagnostics<'a> {
     pub(crate) header: Header<'a>,
-    /// Name of the robot.
-    pub(crate) hardware: &'a str,
+    /// Name of the graph: the hardware id, and part of each name.
+    pub(crate) graph: &'a str,
     pub(crate) statuses: &'a [Status],
 }
 
 impl Message for Diagnostics<'_> {
-    const DEFINITION: &'static Definition = &DIAGNOSTIC_ARRAY;
-
     fn encode(&self, cdr: &mut Cdr) {
         self.header.encode(cdr);
         cdr.count(self.statuses.len());
         for status in self.statuses {
             cdr.u8(status.level as u8);
-            cdr.text(&format!("vigil: {}", status.name));
+            cdr.text(&match status.name.as_str() {
+                "" => format!("vigil/{}", self.graph),
+                name => format!("vigil/{}/{name}", self.graph),
+            });
             cdr.text(&status.message);
-            cdr.text(self.hardware);
+            cdr.text(self.graph);
             cdr.count(status.values.len());
             for (key, value) in &status.values {
                 cdr.text(key);

@@ -1,7 +1,6 @@
 //! Named numbers, which viewers show as curves.
 
 use crate::cdr::Cdr;
-use crate::definitions::{Definition, JOINT_STATE};
 use crate::messages::header::Header;
 use crate::messages::message::Message;
 
@@ -27,8 +26,6 @@ impl<'a> JointState<'a> {
 }
 
 impl Message for JointState<'_> {
-    const DEFINITION: &'static Definition = &JOINT_STATE;
-
     fn encode(&self, cdr: &mut Cdr) {
         self.header.encode(cdr);
         cdr.text_sequence(self.names);

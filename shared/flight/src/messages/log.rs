@@ -1,7 +1,6 @@
 //! A line of a log.
 
 use crate::cdr::Cdr;
-use crate::definitions::{Definition, LOG};
 use crate::messages::header::Stamp;
 use crate::messages::message::Message;
 
@@ -32,8 +31,6 @@ pub(crate) struct LogLine<'a> {
 }
 
 impl Message for LogLine<'_> {
-    const DEFINITION: &'static Definition = &LOG;
-
     fn encode(&self, cdr: &mut Cdr) {
         self.stamp.encode(cdr);
         cdr.u8(self.level as u8);

@@ -1,7 +1,6 @@
 //! Where a robot is, and how it moves.
 
 use crate::cdr::Cdr;
-use crate::definitions::{Definition, ODOMETRY};
 use crate::messages::header::Header;
 use crate::messages::message::Message;
 use crate::messages::pose::PlanarPose;
@@ -47,8 +46,6 @@ impl PlanarTwist {
 }
 
 impl Message for Odometry<'_> {
-    const DEFINITION: &'static Definition = &ODOMETRY;
-
     fn encode(&self, cdr: &mut Cdr) {
         self.header.encode(cdr);
         cdr.text(self.child);

@@ -1,7 +1,6 @@
 //! A text alone.
 
 use crate::cdr::Cdr;
-use crate::definitions::{Definition, STRING};
 use crate::messages::message::Message;
 
 /// `std_msgs/msg/String`.
@@ -11,8 +10,6 @@ pub(crate) struct Text<'a> {
 }
 
 impl Message for Text<'_> {
-    const DEFINITION: &'static Definition = &STRING;
-
     fn encode(&self, cdr: &mut Cdr) {
         cdr.text(self.data);
     }

@@ -1,7 +1,6 @@
 //! Where one frame lies in another.
 
 use crate::cdr::Cdr;
-use crate::definitions::{Definition, TF_MESSAGE};
 use crate::messages::header::Header;
 use crate::messages::message::Message;
 use crate::messages::pose::PlanarPose;
@@ -16,8 +15,6 @@ pub(crate) struct Transform<'a> {
 }
 
 impl Message for Transform<'_> {
-    const DEFINITION: &'static Definition = &TF_MESSAGE;
-
     fn encode(&self, cdr: &mut Cdr) {
         cdr.count(1);
         self.header.encode(cdr);

@@ -5,12 +5,12 @@ use vigil_robot::Description;
 use vigil_setup::Setup;
 
 use super::Outcome;
-use crate::container::Container;
-use crate::error::FlightError;
 use crate::message_times::MessageTimes;
 use crate::messages::joint_state::JointState;
 use crate::messages::text::Text;
 use crate::pace::Pace;
+use crate::sink::Sink;
+use crate::topics;
 
 /// Longest time after which the action is written again, ns.
 const REPEAT_NS: u64 = 1_000_000_000;
@@ -36,24 +36,24 @@ impl ActionTranslation {
     }
 
     /// Writes what a decision says.
-    pub(crate) fn write(
+    pub(crate) fn write<S: Sink>(
         &mut self,
         action: &Action,
         times: MessageTimes,
-        file: &mut Container,
-    ) -> Result<Outcome, FlightError> {
+        sink: &mut S,
+    ) -> Result<Outcome, S::Error> {
         if action.model_hash != self.model_hash {
             return Ok(Outcome::OtherModels);
         }
         let states = self.states.len().min(action.belief.len());
         let (names, values) = (&self.states[..states], &action.belief[..states]);
         let state = JointState::named(times.capture_ns, names, values);
-        file.write("/vigil/decision", times, &state)?;
+        sink.write(&topics::DECISION, times, &state)?;
         if self.pace.is_due(times.log_ns, action.decision_seq) {
             let name = self.actions.get(action.action as usize);
             let name = name.map_or("?", String::as_str);
             let text = self.robot.action_text(name, action.answered());
-            file.write("/vigil/action", times, &Text { data: &text })?;
+            sink.write(&topics::ACTION, times, &Text { data: &text })?;
         }
         Ok(Outcome::Messages)
     }

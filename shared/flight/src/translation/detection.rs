@@ -4,10 +4,10 @@ use vigil_blocks::{DetectionBelief, Evidence};
 use vigil_robot::Description;
 use vigil_robot::channel::{channels, evidence_name};
 
-use crate::container::Container;
-use crate::error::FlightError;
 use crate::message_times::MessageTimes;
 use crate::messages::joint_state::JointState;
+use crate::sink::Sink;
+use crate::topics;
 
 /// What is said of the robot as a whole, in the order of [`whole`].
 const NAMES: [&str; 9] = [
@@ -56,15 +56,15 @@ impl DetectionTranslation {
     }
 
     /// Writes what a belief says.
-    pub(crate) fn write(
+    pub(crate) fn write<S: Sink>(
         &self,
         belief: &DetectionBelief,
         times: MessageTimes,
-        file: &mut Container,
-    ) -> Result<(), FlightError> {
+        sink: &mut S,
+    ) -> Result<(), S::Error> {
         let of_channels = self.places.iter().map(|at| belief.channel_log_odds[*at]);
         let values: Vec<f64> = whole(belief).into_iter().chain(of_channels).collect();
         let state = JointState::named(times.capture_ns, &self.names, &values);
-        file.write("/vigil/detection", times, &state)
+        sink.write(&topics::DETECTION, times, &state)
     }
 }

@@ -1,34 +1,26 @@
-//! What the identifier believes: curves, and a status for each fault that may be.
+//! What the identifier believes: curves, and what it names now.
 
-use vigil_blocks::{FaultBelief, FaultSet, MODE_BLIND, MODE_UNKNOWN, SizeKind, mode_word};
-use vigil_robot::channel::evidence_name;
+use vigil_blocks::{FaultBelief, FaultSet, MODE_BLIND, MODE_UNKNOWN, mode_word};
 use vigil_robot::{Description, FaultTree};
 use vigil_setup::Setup;
 
 use super::Outcome;
-use crate::container::Container;
-use crate::error::FlightError;
+use super::explanation::Explanation;
 use crate::message_times::MessageTimes;
-use crate::messages::diagnostics::{Diagnostics, Level, Status};
-use crate::messages::header::Header;
+use crate::messages::diagnostics::{Level, Status};
 use crate::messages::joint_state::JointState;
-use crate::pace::Pace;
+use crate::sink::Sink;
+use crate::topics;
 
-/// Shortest time between two statuses of one diagnosis, ns.
-const STATUS_NS: u64 = 100_000_000;
-/// Least probability of a fault that has a status.
-const P_SHOWN: f64 = 0.01;
-/// Least probabilities of a fault that is a warning, and of one that is an error. Chosen by hand,
-/// for the colours of viewers; no decision is made by them.
-const P_WARN: f64 = 0.1;
-const P_ERROR: f64 = 0.5;
+/// Name of the status.
+const NAME: &str = "diagnosis";
 
-/// Names of the fault tree, and what the robot is called.
+/// Names of the fault tree, and the newest belief.
 pub(crate) struct DiagnosisTranslation {
     tree: FaultTree,
     robot: Description,
     names: Vec<String>,
-    pace: Pace,
+    newest: Option<Box<FaultBelief>>,
 }
 
 impl DiagnosisTranslation {
@@ -39,41 +31,42 @@ impl DiagnosisTranslation {
             tree: setup.tree.clone(),
             robot: setup.robot.clone(),
             names: nodes.chain(unknown).collect(),
-            pace: Pace::every_ns(STATUS_NS),
+            newest: None,
         }
     }
 
     /// Writes what a belief says.
-    pub(crate) fn write(
+    pub(crate) fn write<S: Sink>(
         &mut self,
         belief: &FaultBelief,
         times: MessageTimes,
-        file: &mut Container,
-    ) -> Result<Outcome, FlightError> {
+        sink: &mut S,
+    ) -> Result<Outcome, S::Error> {
         if belief.tree_hash != self.tree.hash() {
             return Ok(Outcome::OtherModels);
         }
         let nodes = belief.p.iter().take(self.tree.nodes().len()).copied();
         let values: Vec<f64> = nodes.chain([belief.p_unknown]).collect();
         let state = JointState::named(times.capture_ns, &self.names, &values);
-        file.write("/vigil/belief", times, &state)?;
-        if self.pace.is_due(times.log_ns, belief.reported.into()) {
-            let overall = self.overall(belief);
-            let leaves = self.tree.leaves().filter(|at| belief.p[*at] >= P_SHOWN);
-            let leaves = leaves.map(|at| self.leaf(belief, at));
-            let statuses: Vec<Status> = [overall].into_iter().chain(leaves).collect();
-            let diagnostics = Diagnostics {
-                header: Header::at(times.capture_ns),
-                hardware: &self.robot.name,
-                statuses: &statuses,
-            };
-            file.write("/diagnostics", times, &diagnostics)?;
-        }
+        sink.write(&topics::BELIEF, times, &state)?;
+        self.newest = Some(Box::new(*belief));
         Ok(Outcome::Messages)
     }
 
+    /// Nothing is heard any more.
+    pub(crate) fn forget(&mut self) {
+        self.newest = None;
+    }
+
+    /// What the newest belief names.
+    pub(crate) fn status(&self) -> Status {
+        let newest = self.newest.as_deref();
+        let unknown = || Status::stale(NAME, "nothing is heard");
+        newest.map_or_else(unknown, |belief| self.named(belief))
+    }
+
     /// The reported mode, why it is that, and the most probable set.
-    fn overall(&self, belief: &FaultBelief) -> Status {
+    fn named(&self, belief: &FaultBelief) -> Status {
         let level = match belief.reported {
             0 => Level::Ok,
             MODE_UNKNOWN => Level::Warn,
@@ -83,59 +76,33 @@ impl DiagnosisTranslation {
         let mode = |mode: u32| self.tree.mode_name(mode).to_owned();
         let mut values = vec![
             ("mode", mode(belief.mode)),
-            ("p_mode", format!("{:.4}", belief.p_mode)),
+            ("probability", format!("{:.4}", belief.p_mode)),
             ("p_unknown", format!("{:.4}", belief.p_unknown)),
-            ("runner-up", mode(belief.runner_up)),
             ("most probable set", self.set(&belief.sets[0])),
         ];
-        values.extend(self.evidence(belief));
+        values.extend(self.explanation(belief).values(&self.robot));
         Status {
             level,
-            name: "diagnosis".to_owned(),
+            name: NAME.to_owned(),
             message: mode(belief.reported),
             values,
         }
     }
 
-    /// One fault that may be.
-    fn leaf(&self, belief: &FaultBelief, at: usize) -> Status {
-        let p = belief.p[at];
-        let is_reported = belief.reported as usize == at;
-        let level = match p {
-            _ if is_reported || p >= P_ERROR => Level::Error,
-            _ if p >= P_WARN => Level::Warn,
-            _ => Level::Ok,
-        };
-        let size_kind = SizeKind::from_wire(belief.size_kind[at]);
-        let size = size_kind.text(belief.size[at], belief.size_sd[at]);
-        let mut values = vec![("probability", format!("{p:.4}"))];
-        if !size.is_empty() {
-            values.push(("size", size.clone()));
+    /// Of the most probable mode; one that is no node has no size.
+    fn explanation(&self, belief: &FaultBelief) -> Explanation<'_> {
+        let at = belief.mode as usize;
+        let places = belief.channel_evidence.iter().copied().enumerate();
+        let most = places.max_by(|a, b| a.1.total_cmp(&b.1));
+        let (channel, evidence) = most.unwrap_or_default();
+        Explanation {
+            size_kind: belief.size_kind.get(at).copied().unwrap_or_default(),
+            size: belief.size.get(at).copied().unwrap_or_default(),
+            size_sd: belief.size_sd.get(at).copied().unwrap_or_default(),
+            evidence,
+            channel,
+            runner_up: self.tree.mode_name(belief.runner_up),
         }
-        // Evidence is of the most probable mode only.
-        if belief.mode as usize == at {
-            values.extend(self.evidence(belief));
-            let runner_up = self.tree.mode_name(belief.runner_up);
-            values.push(("runner-up", runner_up.to_owned()));
-        }
-        let message = match size.as_str() {
-            "" => format!("p {p:.2}"),
-            size => format!("p {p:.2}, {size}"),
-        };
-        Status {
-            level,
-            name: self.names[at].clone(),
-            message,
-            values,
-        }
-    }
-
-    /// The channel that speaks most for the mode, if any does.
-    fn evidence(&self, belief: &FaultBelief) -> Option<(&'static str, String)> {
-        let places = belief.channel_evidence.iter().enumerate();
-        let (place, nat) = places.max_by(|a, b| a.1.total_cmp(b.1))?;
-        let name = || evidence_name(&self.robot, place);
-        (*nat > 0.0).then(|| ("evidence", format!("{}: {nat:.1} nat", name())))
     }
 
     fn set(&self, set: &FaultSet) -> String {

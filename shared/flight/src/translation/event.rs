@@ -1,15 +1,13 @@
 //! Events in words, as lines of a log and as JSON.
 
-use std::collections::BTreeMap;
-
 use vigil_blocks::EventKind;
-use vigil_timeline::{TimelineEntry, WallClock};
+use vigil_timeline::TimelineEntry;
 
-use crate::container::{ChannelForm, Container};
-use crate::error::FlightError;
 use crate::message_times::MessageTimes;
 use crate::messages::header::Stamp;
 use crate::messages::log::{LogLevel, LogLine};
+use crate::sink::Sink;
+use crate::topics;
 
 /// Codes of kinds, some of which no kind has.
 const CODES: std::ops::Range<u32> = 0..256;
@@ -44,13 +42,12 @@ fn level(name: &str) -> LogLevel {
     }
 }
 
-/// Writes an event.
-pub(crate) fn write_event(
+/// Writes an event; when it was.
+pub(crate) fn write_event<S: Sink>(
     entry: &TimelineEntry,
-    clock: &WallClock,
-    file: &mut Container,
-) -> Result<(), FlightError> {
-    let times = MessageTimes::at(clock.unix_ns(entry.t_ns));
+    sink: &mut S,
+) -> Result<MessageTimes, S::Error> {
+    let times = MessageTimes::at(sink.clock().unix_ns(entry.t_ns));
     let line = entry.to_string();
     let line = LogLine {
         stamp: Stamp {
@@ -60,15 +57,8 @@ pub(crate) fn write_event(
         name: &entry.service,
         text: line.trim(),
     };
-    file.write("/vigil/events", times, &line)?;
-    // An entry is made of numbers and texts, which always have a form in JSON.
-    let json = serde_json::to_vec(entry).unwrap_or_default();
-    file.write_bytes("/vigil/raw/events", times, &json, || ChannelForm {
-        message_encoding: "json",
-        type_name: "",
-        definition: String::new(),
-        notes: BTreeMap::new(),
-    })
+    sink.write(&topics::EVENTS, times, &line)?;
+    Ok(times)
 }
 
 #[cfg(test)]

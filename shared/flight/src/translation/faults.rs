@@ -1,115 +1,113 @@
-//! The life of faults.
+//! The life of faults: the graph as a whole, and each fault.
 
-use vigil_blocks::{
-    FaultRecord, FaultSource, FaultState, Faults, OverallState, Severity, SizeKind,
-};
-use vigil_robot::channel::evidence_name;
-use vigil_robot::{Description, FaultTree};
-use vigil_setup::{Setup, fault_name};
+use std::collections::BTreeSet;
+
+use vigil_blocks::{Faults, OverallState};
+use vigil_setup::Setup;
 
 use super::Outcome;
-use crate::container::Container;
-use crate::error::FlightError;
+use super::fault_status::FaultNames;
 use crate::message_times::MessageTimes;
 use crate::messages::diagnostics::{Diagnostics, Level, Status};
 use crate::messages::header::Header;
 use crate::pace::Pace;
+use crate::sink::Sink;
+use crate::topics;
 
 /// Shortest time between two messages that say the same, ns.
 const REPEAT_NS: u64 = 500_000_000;
 
-/// Names of faults, and of what is done about them.
+/// Names of faults, and those that were told last.
 pub(crate) struct FaultsTranslation {
-    tree: FaultTree,
-    robot: Description,
-    actions: Vec<String>,
+    graph: String,
+    names: FaultNames,
+    told: BTreeSet<String>,
     pace: Pace,
-}
-
-/// How grave a fault is for viewers: one that is over, or only suspected, is no error.
-fn level(record: &FaultRecord) -> Level {
-    let is_grave = record.severity == Severity::Fault as u32;
-    match record.state() {
-        Some(FaultState::Active | FaultState::Acknowledged) if is_grave => Level::Error,
-        Some(FaultState::Cleared) => Level::Ok,
-        Some(_) => Level::Warn,
-        None => Level::Stale,
-    }
 }
 
 impl FaultsTranslation {
     pub(crate) fn new(setup: &Setup) -> Self {
         Self {
-            tree: setup.tree.clone(),
-            robot: setup.robot.clone(),
-            actions: setup.decision.actions().to_vec(),
+            graph: setup.file.graph.name.clone(),
+            names: FaultNames::new(setup),
+            told: BTreeSet::new(),
             pace: Pace::every_ns(REPEAT_NS),
         }
     }
 
-    /// Writes what is known of faults.
-    pub(crate) fn write(
+    /// The same after a new start of the graph: what is told no longer is still over.
+    pub(crate) fn restarted(self, setup: &Setup) -> Self {
+        Self {
+            told: self.told,
+            ..Self::new(setup)
+        }
+    }
+
+    /// Writes what is known of faults, and `diagnosis` besides. A fault that is kept no longer is
+    /// told to be over, once.
+    pub(crate) fn write<S: Sink>(
         &mut self,
         faults: &Faults,
+        diagnosis: impl FnOnce() -> Status,
         times: MessageTimes,
-        file: &mut Container,
-    ) -> Result<Outcome, FlightError> {
-        if faults.tree_hash != self.tree.hash() {
+        sink: &mut S,
+    ) -> Result<Outcome, S::Error> {
+        if faults.tree_hash != self.names.tree_hash() {
             return Ok(Outcome::OtherModels);
         }
-        if self.pace.is_due(times.log_ns, faults.revision) {
-            let overall = overall(faults);
-            let records = faults.kept().map(|record| self.status(record));
-            let statuses: Vec<Status> = [overall].into_iter().chain(records).collect();
-            let diagnostics = Diagnostics {
-                header: Header::at(times.capture_ns),
-                hardware: &self.robot.name,
-                statuses: &statuses,
-            };
-            file.write("/vigil/faults", times, &diagnostics)?;
+        if !self.pace.is_due(times.log_ns, faults.revision) {
+            return Ok(Outcome::Messages);
         }
+        let mut statuses = vec![overall(faults)];
+        let mut records: Vec<_> = faults.kept().collect();
+        // Of one name, what was last comes last: readers keep that.
+        records.sort_by_key(|record| record.number);
+        let clock = *sink.clock();
+        statuses.extend(records.iter().map(|of| self.names.status(of, &clock)));
+        let told = statuses[1..].iter().map(|status| status.name.clone());
+        let before = std::mem::replace(&mut self.told, told.collect());
+        let over = before.difference(&self.told).map(|name| Status {
+            level: Level::Ok,
+            name: name.clone(),
+            message: "over, and kept no longer".to_owned(),
+            values: Vec::new(),
+        });
+        statuses.extend(over);
+        self.send(statuses, diagnosis(), times, sink)?;
         Ok(Outcome::Messages)
     }
 
-    fn status(&self, record: &FaultRecord) -> Status {
-        let state = record.state().map_or("?", FaultState::name);
-        let severity = Severity::from_repr(record.severity).map_or("?", Severity::name);
-        let source = FaultSource::from_repr(record.source);
-        let action = self.actions.get(record.action as usize);
-        let mut values = vec![
-            ("number", record.number.to_string()),
-            ("source", source.map_or("?", FaultSource::name).to_owned()),
-            ("state", state.to_owned()),
-            ("severity", severity.to_owned()),
-            ("count", record.count.to_string()),
-            ("probability", format!("{:.4}", record.p)),
-            ("action", action.map_or("?", String::as_str).to_owned()),
-        ];
-        if source == Some(FaultSource::Robot) {
-            values.extend(self.explanation(record));
-        }
-        Status {
-            level: level(record),
-            name: fault_name(&self.tree, record.source, record.what).to_owned(),
-            message: format!("{state} ({severity}), p {:.2}", record.p),
-            values,
-        }
+    /// Writes that nothing of it is known any more.
+    pub(crate) fn write_stale<S: Sink>(
+        &self,
+        why: &str,
+        diagnosis: Status,
+        times: MessageTimes,
+        sink: &mut S,
+    ) -> Result<(), S::Error> {
+        let faults = self.told.iter().map(|name| Status::stale(name, why));
+        let statuses = [Status::stale("", why)].into_iter().chain(faults);
+        self.send(statuses.collect(), diagnosis, times, sink)
     }
 
-    /// Size of a fault of the robot, and why it is that one.
-    fn explanation(&self, record: &FaultRecord) -> Vec<(&'static str, String)> {
-        let size = SizeKind::from_wire(record.size_kind).text(record.size, record.size_sd);
-        let mut values = Vec::new();
-        if !size.is_empty() {
-            values.push(("size", size));
+    fn send<S: Sink>(
+        &self,
+        mut statuses: Vec<Status>,
+        diagnosis: Status,
+        times: MessageTimes,
+        sink: &mut S,
+    ) -> Result<(), S::Error> {
+        sink.write(&topics::FAULTS, times, &self.array(&statuses, times))?;
+        statuses.insert(1, diagnosis);
+        sink.write(&topics::DIAGNOSTICS, times, &self.array(&statuses, times))
+    }
+
+    fn array<'a>(&'a self, statuses: &'a [Status], times: MessageTimes) -> Diagnostics<'a> {
+        Diagnostics {
+            header: Header::at(times.capture_ns),
+            graph: &self.graph,
+            statuses,
         }
-        if record.evidence > 0.0 {
-            let channel = evidence_name(&self.robot, record.evidence_channel as usize);
-            values.push(("evidence", format!("{channel}: {:.1} nat", record.evidence)));
-            let runner_up = self.tree.mode_name(record.runner_up);
-            values.push(("runner-up", runner_up.to_owned()));
-        }
-        values
     }
 }
 
@@ -122,11 +120,13 @@ fn overall(faults: &Faults) -> Status {
         Some(OverallState::Fault | OverallState::SafeStop) => Level::Error,
         Some(OverallState::Stale) | None => Level::Stale,
     };
+    let state = state.map_or("?", OverallState::name);
     Status {
         level,
-        name: "overall".to_owned(),
-        message: state.map_or("?", OverallState::name).to_owned(),
+        name: String::new(),
+        message: state.to_owned(),
         values: vec![
+            ("state", state.to_owned()),
             ("faults", faults.fault_count.to_string()),
             ("dropped", faults.dropped_count.to_string()),
         ],

@@ -5,14 +5,14 @@ use vigil_robot::Description;
 use vigil_robot::channel::{Channel, Role, channels, hash};
 
 use super::Outcome;
-use crate::container::Container;
-use crate::error::FlightError;
 use crate::message_times::MessageTimes;
 use crate::messages::header::{Header, Stamp};
 use crate::messages::joint_state::JointState;
 use crate::messages::odometry::{Odometry, PlanarTwist};
 use crate::messages::pose::PlanarPose;
 use crate::messages::transform::Transform;
+use crate::sink::Sink;
+use crate::topics;
 
 /// Frames by the convention of ROS: the pose's, and the robot's.
 const ODOM: &str = "odom";
@@ -79,12 +79,12 @@ impl FrameTranslation {
     }
 
     /// Writes what a frame says.
-    pub(crate) fn write(
+    pub(crate) fn write<S: Sink>(
         &self,
         frame: &SensorFrame,
         times: MessageTimes,
-        file: &mut Container,
-    ) -> Result<Outcome, FlightError> {
+        sink: &mut S,
+    ) -> Result<Outcome, S::Error> {
         if frame.robot_hash != self.robot_hash {
             return Ok(Outcome::OtherModels);
         }
@@ -93,25 +93,25 @@ impl FrameTranslation {
         let values: Vec<f64> = (0..self.channels.len()).map(measured).collect();
         if !values.is_empty() {
             let state = JointState::named(at_ns, &self.channels, &values);
-            file.write("/vigil/channels", times, &state)?;
+            sink.write(&topics::CHANNELS, times, &state)?;
         }
         let commanded = |axis: usize| frame.commanded(axis).unwrap_or(f64::NAN);
         let values: Vec<f64> = (0..self.axes.len()).map(commanded).collect();
         if !values.is_empty() {
             let state = JointState::named(at_ns, &self.axes, &values);
-            file.write("/vigil/command", times, &state)?;
+            sink.write(&topics::COMMAND, times, &state)?;
         }
-        self.write_joints(frame, times, file)?;
-        self.write_pose(frame, times, file)?;
+        self.write_joints(frame, times, sink)?;
+        self.write_pose(frame, times, sink)?;
         Ok(Outcome::Messages)
     }
 
-    fn write_joints(
+    fn write_joints<S: Sink>(
         &self,
         frame: &SensorFrame,
         times: MessageTimes,
-        file: &mut Container,
-    ) -> Result<(), FlightError> {
+        sink: &mut S,
+    ) -> Result<(), S::Error> {
         if self.joints.is_empty() {
             return Ok(());
         }
@@ -129,16 +129,16 @@ impl FrameTranslation {
             positions: &values(false),
             velocities: &values(true),
         };
-        file.write("/joint_states", times, &state)
+        sink.write(&topics::JOINT_STATES, times, &state)
     }
 
     /// A pose that is not measured is left out: viewers cannot show it.
-    fn write_pose(
+    fn write_pose<S: Sink>(
         &self,
         frame: &SensorFrame,
         times: MessageTimes,
-        file: &mut Container,
-    ) -> Result<(), FlightError> {
+        sink: &mut S,
+    ) -> Result<(), S::Error> {
         let finite = |place: usize| frame.measured(place).filter(|value| value.is_finite());
         let pose = || {
             let [x, y, yaw] = self.pose?;
@@ -162,7 +162,7 @@ impl FrameTranslation {
             child: BASE,
             pose,
         };
-        file.write("/tf", times, &transform)?;
+        sink.write(&topics::TF, times, &transform)?;
         let odometry = Odometry {
             header,
             child: BASE,
@@ -172,6 +172,6 @@ impl FrameTranslation {
                 yaw_rate: self.yaw_rate.and_then(finite),
             },
         };
-        file.write("/odom", times, &odometry)
+        sink.write(&topics::ODOM, times, &odometry)
     }
 }

@@ -5,19 +5,19 @@ use vigil_cycle::topic::ServiceName;
 use vigil_setup::Setup;
 use vigil_timeline::{degraded_text, service_state_text};
 
-use crate::container::Container;
-use crate::error::FlightError;
 use crate::message_times::MessageTimes;
 use crate::messages::diagnostics::{Diagnostics, Level, Status};
 use crate::messages::header::Header;
 use crate::pace::Pace;
+use crate::sink::Sink;
+use crate::topics;
 
 /// Shortest time between two messages of a service that say the same, ns.
 const REPEAT_NS: u64 = 500_000_000;
 
 /// How often each service is written.
 pub(crate) struct HealthTranslation {
-    robot: String,
+    graph: String,
     paces: [Pace; ServiceName::ALL.len()],
 }
 
@@ -46,6 +46,11 @@ fn values(health: &Health) -> Vec<(&'static str, String)> {
     ]
 }
 
+/// Services have a part of the names of their own: a fault may have the name of a service.
+fn name(service: ServiceName) -> String {
+    format!("health/{}", service.as_str())
+}
+
 fn status(service: ServiceName, health: &Health) -> Status {
     let level = match health.degraded {
         0 => Level::Ok,
@@ -55,7 +60,7 @@ fn status(service: ServiceName, health: &Health) -> Status {
     let state = service_state_text(health.state);
     Status {
         level,
-        name: service.as_str().to_owned(),
+        name: name(service),
         message: match health.degraded {
             0 => state.to_owned(),
             bits => format!("{state}, degraded: {}", degraded_text(bits)),
@@ -67,29 +72,49 @@ fn status(service: ServiceName, health: &Health) -> Status {
 impl HealthTranslation {
     pub(crate) fn new(setup: &Setup) -> Self {
         Self {
-            robot: setup.robot.name.clone(),
+            graph: setup.file.graph.name.clone(),
             paces: std::array::from_fn(|_| Pace::every_ns(REPEAT_NS)),
         }
     }
 
     /// Writes what a service says. It is at most two messages a second, and one whenever the state
     /// or the degraded mode is another.
-    pub(crate) fn write(
+    pub(crate) fn write<S: Sink>(
         &mut self,
         service: ServiceName,
         health: &Health,
         times: MessageTimes,
-        file: &mut Container,
-    ) -> Result<(), FlightError> {
+        sink: &mut S,
+    ) -> Result<(), S::Error> {
         let mark = u64::from(health.state) << 32 | u64::from(health.degraded);
         if !self.paces[service.index()].is_due(times.log_ns, mark) {
             return Ok(());
         }
+        self.send(status(service, health), times, sink)
+    }
+
+    /// Writes that nothing is known of a service any more.
+    pub(crate) fn write_stale<S: Sink>(
+        &self,
+        service: ServiceName,
+        why: &str,
+        times: MessageTimes,
+        sink: &mut S,
+    ) -> Result<(), S::Error> {
+        self.send(Status::stale(&name(service), why), times, sink)
+    }
+
+    fn send<S: Sink>(
+        &self,
+        status: Status,
+        times: MessageTimes,
+        sink: &mut S,
+    ) -> Result<(), S::Error> {
         let diagnostics = Diagnostics {
             header: Header::at(times.capture_ns),
-            hardware: &self.robot,
-            statuses: &[status(service, health)],
+            graph: &self.graph,
+            statuses: &[status],
         };
-        file.write("/vigil/health", times, &diagnostics)
+        sink.write(&topics::HEALTH, times, &diagnostics)
     }
 }

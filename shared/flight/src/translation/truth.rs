@@ -2,20 +2,20 @@
 
 use vigil_blocks::Truth;
 
-use crate::container::Container;
-use crate::error::FlightError;
 use crate::message_times::MessageTimes;
 use crate::messages::header::{Header, Stamp};
 use crate::messages::odometry::{Odometry, PlanarTwist};
 use crate::messages::pose::PlanarPose;
+use crate::sink::Sink;
+use crate::topics;
 
 /// Writes where the robot really is. A simulator's pose sensor measures in the world's own frame,
 /// so that both poses lie in one picture.
-pub(crate) fn write_truth(
+pub(crate) fn write_truth<S: Sink>(
     truth: &Truth,
     times: MessageTimes,
-    file: &mut Container,
-) -> Result<(), FlightError> {
+    sink: &mut S,
+) -> Result<(), S::Error> {
     let [x, y, yaw] = truth.pose;
     let [forward, lateral, yaw_rate] = truth.velocity;
     let odometry = Odometry {
@@ -32,5 +32,5 @@ pub(crate) fn write_truth(
             yaw_rate: Some(yaw_rate),
         },
     };
-    file.write("/vigil/truth", times, &odometry)
+    sink.write(&topics::TRUTH, times, &odometry)
 }
