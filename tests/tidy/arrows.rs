@@ -63,6 +63,8 @@ const SHARED: &[&str] = &[
     "vigil-diagnosis",
     "vigil-pomdp",
     "vigil-blocks",
+    "vigil-checkpoint",
+    "vigil-checkpoint-derive",
 ];
 
 /// The services whose `step` others may run offline.
@@ -82,6 +84,7 @@ const TOOLS: &[&str] = &[
     "vigil-evaluation",
     "vigil-import",
     "vigil-missions",
+    "vigil-replay",
     "vigil-lab",
     "vigil-ros2",
     "vigil",
@@ -93,18 +96,33 @@ const OF_THE_DOOR: &[&str] = &["vigil-terminal", "vigil-launcher"];
 
 /// For each shared crate, the crates of the workspace that it may see.
 const ALLOWED: &[(&str, &[&str])] = &[
-    ("vigil-blocks", &[]),
-    ("vigil-inference", &[]),
+    ("vigil-checkpoint-derive", &[]),
+    ("vigil-checkpoint", &["vigil-checkpoint-derive"]),
+    ("vigil-blocks", &["vigil-checkpoint"]),
+    ("vigil-inference", &["vigil-checkpoint"]),
     ("vigil-pomdp", &[]),
-    ("vigil-cycle", &["vigil-blocks"]),
-    ("vigil-robot", &["vigil-inference", "vigil-blocks"]),
+    ("vigil-cycle", &["vigil-blocks", "vigil-checkpoint"]),
+    (
+        "vigil-robot",
+        &["vigil-inference", "vigil-blocks", "vigil-checkpoint"],
+    ),
     (
         "vigil-diagnosis",
-        &["vigil-robot", "vigil-inference", "vigil-blocks"],
+        &[
+            "vigil-robot",
+            "vigil-inference",
+            "vigil-blocks",
+            "vigil-checkpoint",
+        ],
     ),
     (
         "vigil-decision",
-        &["vigil-pomdp", "vigil-robot", "vigil-blocks"],
+        &[
+            "vigil-pomdp",
+            "vigil-robot",
+            "vigil-blocks",
+            "vigil-checkpoint",
+        ],
     ),
     // Setup reads every model that a graph names, and turns the configuration into what the cycle
     // needs: placement, deadlines, queues.
@@ -142,6 +160,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
 
 /// Crates that compute only: no transport, no clock, no system call.
 const PURE: &[&str] = &[
+    "vigil-checkpoint",
     "vigil-blocks",
     "vigil-inference",
     "vigil-pomdp",

@@ -147,10 +147,12 @@ impl Journal {
 
 block! {
     /// A part of a service's state, from which a replay can go on.
-    pub struct CheckpointPart, size 16464 {
+    pub struct CheckpointPart, size 16472 {
         /// Common header.
         pub header: Header,
-        /// The state is that after the journal's block of this sequence number.
+        /// The state is that after this block of the journal: its epoch.
+        pub journal_epoch: u64,
+        /// Its sequence number.
         pub journal_seq: u64,
         /// Place of this part in the state, bytes.
         pub offset: u32,

@@ -134,6 +134,7 @@ impl JournalWriter {
         };
         self.head.hash = fnv1a::hash(fnv1a::BASIS, &self.state[..whole]);
         self.head.whole = whole as u32;
+        self.head.journal_epoch = self.journal.epoch();
         self.head.journal_seq = self.journal.next_seq().saturating_sub(1);
         self.sent = 0;
     }
@@ -142,6 +143,7 @@ impl JournalWriter {
         let rest = &self.state[self.sent..self.head.whole as usize];
         let bytes = &rest[..rest.len().min(CHECKPOINT_BYTES)];
         let part = self.parts.block();
+        part.journal_epoch = self.head.journal_epoch;
         part.journal_seq = self.head.journal_seq;
         (part.whole, part.hash) = (self.head.whole, self.head.hash);
         (part.offset, part.size) = (self.sent as u32, bytes.len() as u32);

@@ -60,11 +60,14 @@ pub enum HierarchyError {
     Overlap(usize, usize),
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 struct Node {
+    #[checkpoint(fixed)]
     leaves: Vec<usize>,
     /// Nodes directly below, and leaves below none of them.
+    #[checkpoint(fixed)]
     nodes_below: Vec<usize>,
+    #[checkpoint(fixed)]
     leaves_below: Vec<usize>,
     merged: bool,
 }
@@ -75,7 +78,7 @@ struct Node {
 #[checkpoint(bound = "M::State: CheckpointValue")]
 pub struct Hierarchical<M: Sampled> {
     model: M,
-    #[checkpoint(fixed)]
+    #[checkpoint(each)]
     nodes: Vec<Node>,
     /// Abstract nodes above each mode, from the top.
     above: Vec<Vec<usize>>,

@@ -177,7 +177,9 @@ impl Recording {
             Topic::DetectionParticles
             | Topic::DiagnosisParticles
             | Topic::Truth
-            | Topic::Control(_) => {}
+            | Topic::Control(_)
+            | Topic::Journal(_)
+            | Topic::Checkpoint(_) => {}
         }
         Some(())
     }

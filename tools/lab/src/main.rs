@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use vigil_terminal::exit_code;
 
-use commands::{diagnose, evaluate, import, init, learn, pomdp, report};
+use commands::{diagnose, evaluate, import, init, learn, pomdp, replay, report};
 
 /// Learns models, imports logs, diagnoses and scores recorded runs, solves decision models.
 ///
@@ -27,6 +27,7 @@ enum Command {
     Diagnose(diagnose::Args),
     Evaluate(evaluate::Args),
     Report(report::Args),
+    Replay(replay::Args),
     Pomdp(pomdp::Args),
 }
 
@@ -38,6 +39,7 @@ fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::Replay(args) => replay::run(&args),
         Command::Pomdp(args) => pomdp::run(&args),
     })
 }

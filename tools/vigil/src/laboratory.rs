@@ -10,13 +10,17 @@ use crate::beside;
 /// The program's name.
 const PROGRAM: &str = "vigil-lab";
 /// Its commands, and what each does.
-const COMMANDS: [(&str, &str); 7] = [
+const COMMANDS: [(&str, &str); 8] = [
     ("init", "Writes the files of a new robot, from its log"),
     ("import", "Turns another program's log into frames"),
     ("learn", "Learns a model from recorded frames, or shows one"),
     ("diagnose", "Diagnoses recorded runs"),
     ("evaluate", "Scores the diagnosis on labelled runs"),
     ("report", "Writes a page about a recording or runs"),
+    (
+        "replay",
+        "Computes a recording again, and compares it bit by bit",
+    ),
     (
         "pomdp",
         "Checks, solves, compares and learns decision models",

@@ -1,5 +1,7 @@
 //! How far a body may be behind the command.
 
+use vigil_checkpoint::CheckpointValue;
+
 /// Bounds of what the body is apart from the command.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Behind {
@@ -13,7 +15,7 @@ pub(super) struct Behind {
 
 /// The bounds. Each change of the command adds its magnitude, which fades with the longest
 /// time constant: of a body with a shorter one, whatever it is, less is left.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 pub(super) struct LagBounds {
     lag_s: f64,
     before: [f64; 3],

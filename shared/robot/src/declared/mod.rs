@@ -171,7 +171,6 @@ pub struct Monitor {
     use_wheels: bool,
     #[checkpoint(fixed)]
     promise: Promise,
-    #[checkpoint(fixed)]
     lag: LagBounds,
     pose: PoseBlocks,
     wheels: [Wheel; WHEELS],

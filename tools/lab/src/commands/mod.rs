@@ -12,4 +12,5 @@ mod learn_channels;
 mod learn_task;
 mod offline;
 pub mod pomdp;
+pub mod replay;
 pub mod report;

@@ -1,0 +1,295 @@
+//! The graph in one thread under the virtual clock, written as a recording.
+
+use std::path::{Path, PathBuf};
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+use vigil_blocks::{
+    Action, CheckpointPart, DetectionBelief, FaultBelief, Journal, ParticleBlock, SensorFrame,
+};
+use vigil_cycle::placement::{PlacementRequest, read_back};
+use vigil_cycle::port::{Bus, TopicBlock};
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{
+    CycleAccount, DeadlineMonitor, Graph, HealthBoard, Receiver, Recorder, Sender, SourceCycle,
+    Stage, StageCycle, Stamp, Topic, VirtualClock,
+};
+use vigil_detector::DetectorStage;
+use vigil_flight::FlightWriter;
+use vigil_identifier::IdentifierStage;
+use vigil_sensor_sim::{SensorSource, SimulatorSource};
+use vigil_setup::graph_file::GraphFile;
+use vigil_setup::{Document, GraphArgs, Setup};
+use vigil_supervisor::{FaultBoard, SupervisorStage};
+use vigil_timeline::WallClock;
+
+/// What is recorded, and how it runs.
+pub struct Drive {
+    /// Name of the configuration.
+    pub config: &'static str,
+    /// What of it is changed.
+    pub change: fn(&mut GraphFile),
+    /// Faults that are injected.
+    pub inject: &'static [&'static str],
+    /// Cycles of the graph.
+    pub cycles: u64,
+    /// Cycles before the recording begins.
+    pub unrecorded: u64,
+}
+
+/// A topic that is recorded.
+struct Feed<T> {
+    topic: Topic,
+    receiver: Box<dyn Receiver<T>>,
+}
+
+impl<T: TopicBlock> Feed<T> {
+    fn new(graph: &Graph, topic: Topic) -> Self {
+        let receiver = graph.receiver(topic).unwrap();
+        Self { topic, receiver }
+    }
+
+    /// Writes what has come; drops it without a file.
+    fn drain(&mut self, flight: &mut Option<FlightWriter>) {
+        while let Some(block) = self.receiver.take_next() {
+            if let Some(flight) = flight {
+                flight.block(self.topic, bytemuck::bytes_of(block)).unwrap();
+            }
+        }
+    }
+}
+
+/// All that a replay needs.
+struct Feeds {
+    frames: Feed<SensorFrame>,
+    detections: Feed<DetectionBelief>,
+    particles: Feed<ParticleBlock>,
+    diagnoses: Feed<FaultBelief>,
+    actions: Feed<Action>,
+    journals: [Feed<Journal>; 3],
+    checkpoints: [Feed<CheckpointPart>; 3],
+}
+
+impl Feeds {
+    fn new(graph: &Graph) -> Self {
+        let services = ServiceName::STEPPING;
+        Self {
+            frames: Feed::new(graph, Topic::Sensor),
+            detections: Feed::new(graph, Topic::Detection),
+            particles: Feed::new(graph, Topic::DetectionParticles),
+            diagnoses: Feed::new(graph, Topic::Diagnosis),
+            actions: Feed::new(graph, Topic::Action),
+            journals: services.map(|service| Feed::new(graph, Topic::Journal(service))),
+            checkpoints: services.map(|service| Feed::new(graph, Topic::Checkpoint(service))),
+        }
+    }
+
+    fn drain(&mut self, flight: &mut Option<FlightWriter>) {
+        // Journals before what they are about, as it may happen in a recording.
+        self.journals.iter_mut().for_each(|feed| feed.drain(flight));
+        self.checkpoints
+            .iter_mut()
+            .for_each(|feed| feed.drain(flight));
+        self.frames.drain(flight);
+        self.detections.drain(flight);
+        self.diagnoses.drain(flight);
+        self.actions.drain(flight);
+        // Recordings have few of them, and a replay needs none.
+        self.particles.drain(&mut None);
+    }
+}
+
+/// Where frames come from.
+enum Publisher {
+    /// The simulated rover.
+    Rover(Box<SourceCycle>, Box<SimulatorSource>),
+    /// A Kobuki by its geometry, whose left wheel sticks.
+    Kobuki(Box<dyn Sender<SensorFrame>>, u64, Pcg64Mcg),
+}
+
+/// From then on the Kobuki's left wheel stands, s.
+const STUCK_S: f64 = 30.0;
+
+impl Publisher {
+    fn new(setup: &Setup, graph: &Graph, inject: &[&str]) -> Self {
+        if setup.robot.name == "kobuki" {
+            let frames = graph.sender(Topic::Sensor).unwrap();
+            let hash = vigil_robot::channel::hash(&setup.robot);
+            return Self::Kobuki(frames, hash, Pcg64Mcg::seed_from_u64(1));
+        }
+        let inject: Vec<String> = inject.iter().map(|it| (*it).to_owned()).collect();
+        let SensorSource::Simulator(simulation, schedule) =
+            vigil_sensor_sim::assemble(setup, &inject).unwrap()
+        else {
+            unreachable!("the graph simulates");
+        };
+        let period_ns = setup.period_ns();
+        let source = SimulatorSource::new(*simulation, schedule, true, period_ns, graph);
+        let cycle = SourceCycle::new(account(setup, graph, ServiceName::SensorSim), period_ns);
+        Self::Rover(Box::new(cycle), Box::new(source.unwrap()))
+    }
+
+    fn turn(&mut self, clock: &VirtualClock, t_ns: u64) {
+        match self {
+            Self::Rover(cycle, source) => {
+                assert!(cycle.turn(&mut **source, clock).unwrap().is_continue());
+            }
+            Self::Kobuki(frames, hash, rng) => {
+                let t_s = t_ns as f64 * 1e-9;
+                let frame = frames.block();
+                (frame.run_id, frame.robot_hash) = (1, *hash);
+                kobuki(frame, t_s, rng);
+                let stamp = Stamp {
+                    t_schedule_ns: t_ns,
+                    t_capture_ns: t_ns,
+                };
+                frames.send(stamp, clock).unwrap();
+                frames.prepare().unwrap();
+            }
+        }
+    }
+}
+
+/// Drives about.
+fn kobuki(frame: &mut SensorFrame, t_s: f64, rng: &mut Pcg64Mcg) {
+    let mut noise = |sd: f64| sd * rng.sample::<f64, _>(StandardNormal);
+    frame.set_command(0, 0.25 + 0.1 * (0.5 * t_s).sin());
+    frame.set_command(1, 0.5 * (0.37 * t_s).sin());
+    for (wheel, side) in [(0, -1.0), (1, 1.0)] {
+        let stands = wheel == 0 && t_s > STUCK_S;
+        let speed = frame.command[0] + side * 0.115 * frame.command[1];
+        let rate = if stands { 0.0 } else { speed / 0.035 };
+        frame.set_channel(wheel, rate + noise(0.1));
+        frame.set_channel(3 + wheel, 0.03 + noise(0.005));
+    }
+    let difference = frame.channel[1] - frame.channel[0];
+    frame.set_channel(2, difference * 0.035 / 0.23 + noise(0.02));
+}
+
+fn stage(setup: &Setup, graph: &Graph, name: ServiceName) -> StageCycle {
+    StageCycle::new(account(setup, graph, name))
+}
+
+fn account(setup: &Setup, graph: &Graph, name: ServiceName) -> CycleAccount {
+    let schedule = setup
+        .plan(name, vigil_cycle::serve::Leave::default())
+        .schedule;
+    let wanted = PlacementRequest {
+        core: 0,
+        priority: 1,
+    };
+    let sender = graph.sender(Topic::Health(name)).unwrap();
+    let board = HealthBoard::new(sender, schedule, wanted, read_back(0));
+    CycleAccount::new(
+        DeadlineMonitor::new(schedule),
+        board,
+        Recorder::new().unwrap(),
+    )
+}
+
+/// The configuration, as a file of its own.
+fn document(drive: &Drive) -> Document {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..");
+    let args = GraphArgs {
+        config: root.join("config").join(drive.config),
+        ..GraphArgs::default()
+    };
+    let mut document = args.read().unwrap();
+    (drive.change)(&mut document.file);
+    document
+}
+
+/// Runs the graph, and writes what it publishes.
+pub fn record(drive: &Drive, path: &Path) {
+    use ServiceName::{Detector, Identifier, Supervisor};
+    let document = document(drive);
+    let text = document.to_text().unwrap();
+    let setup = Document::from_text(path, text.clone())
+        .unwrap()
+        .check()
+        .unwrap();
+    let (period_ns, clock) = (setup.period_ns(), VirtualClock::default());
+    let graph = Graph::InProcess(Bus::new(clock.clone()));
+    let mut feeds = Feeds::new(&graph);
+    let mut publisher = Publisher::new(&setup, &graph, drive.inject);
+    let mut detector = {
+        let step = vigil_detector::assemble(&setup).unwrap();
+        DetectorStage::new(step, &setup.robot, &graph).unwrap()
+    };
+    let mut identifier = {
+        let step = vigil_identifier::assemble(&setup).unwrap();
+        IdentifierStage::new(step, &setup.robot, &graph).unwrap()
+    };
+    let mut supervisor = {
+        let step = vigil_supervisor::assemble(&setup).unwrap();
+        let life = vigil_supervisor::fault_life(&setup).unwrap();
+        let board = FaultBoard::new(life, setup.tree.hash(), &graph, None).unwrap();
+        let validity_ns = vigil_supervisor::validity_ns(&setup);
+        SupervisorStage::new(step, board, &graph, validity_ns).unwrap()
+    };
+    let mut cycles = [Detector, Identifier, Supervisor].map(|name| stage(&setup, &graph, name));
+    clock.set(period_ns);
+    for cycle in &mut cycles {
+        cycle.account_mut().ready(&clock).unwrap();
+    }
+    let mut flight = None;
+    for k in 1..=drive.cycles {
+        if k > drive.unrecorded && flight.is_none() {
+            let mut file = FlightWriter::create(path, &setup, WallClock::now()).unwrap();
+            file.attach("document.toml", "application/toml", text.as_bytes())
+                .unwrap();
+            flight = Some(file);
+        }
+        clock.set(k * period_ns);
+        let hiccup = hiccup(k);
+        if hiccup == Hiccup::Silent {
+            // Later than every deadline of this period.
+            clock.advance(period_ns - 1);
+        } else {
+            publisher.turn(&clock, k * period_ns);
+        }
+        let [first, second, third] = &mut cycles;
+        if hiccup != Hiccup::DetectorLate {
+            turn(first, &mut detector, &clock);
+        }
+        if hiccup != Hiccup::IdentifierLate {
+            turn(second, &mut identifier, &clock);
+        }
+        if k % 997 == 5 {
+            // As a cycle near its limit does.
+            identifier.limit(20 + (k % 100) as u32);
+        }
+        turn(third, &mut supervisor, &clock);
+        if k % 4 == 0 {
+            feeds.drain(&mut flight);
+        }
+    }
+    feeds.drain(&mut flight);
+    flight.unwrap().finish().unwrap();
+}
+
+fn turn(cycle: &mut StageCycle, stage: &mut impl Stage, clock: &VirtualClock) {
+    assert!(cycle.turn(stage, clock).unwrap().is_continue());
+}
+
+/// What goes wrong in a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Hiccup {
+    Nothing,
+    /// No frame comes.
+    Silent,
+    /// The detector folds this frame and the next.
+    DetectorLate,
+    /// The identifier folds this detection and the next.
+    IdentifierLate,
+}
+
+const fn hiccup(k: u64) -> Hiccup {
+    match k % 331 {
+        77 | 230..=233 => Hiccup::Silent,
+        120 | 121 => Hiccup::DetectorLate,
+        160..=162 => Hiccup::IdentifierLate,
+        _ => Hiccup::Nothing,
+    }
+}

@@ -1,0 +1,330 @@
+//! `vigil replay`: a recording, computed again and compared bit by bit.
+
+use std::io::{self, BufRead};
+use std::path::PathBuf;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use vigil_cycle::topic::ServiceName;
+use vigil_replay::{Answer, Difference, Gap, Moment, Replay, Tally, What};
+use vigil_setup::Setup;
+use vigil_terminal::{CommandError, Outcome, output};
+use vigil_timeline::unix_time_of_day;
+
+/// Differences and gaps that are listed at most; all are counted.
+const LISTED_MAX: usize = 20;
+/// Longest time that is waited for, s: gaps of a recording need not be sat through.
+const WAIT_S_MAX: f64 = 10.0;
+
+/// Computes again what a recorded graph believed and did, and compares it bit by bit.
+///
+/// Prints each change of alarm, name and action as it is computed, and what differs from the
+/// recording. A service is computed from its start, or from the first state that it handed out. What
+/// was not recorded is named, and the service waits for its next state.
+///
+/// Ends with 1 if anything differs, or nothing could be compared.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A recording of the black box, such as `vigil recordings` lists.
+    #[arg(value_name = "RECORDING")]
+    recording: PathBuf,
+    /// Only compare: print no changes.
+    #[arg(long)]
+    verify: bool,
+    /// Times as fast as it was; without it as fast as it goes.
+    #[arg(long, value_name = "FACTOR", conflicts_with = "verify", value_parser = factor)]
+    speed: Option<f64>,
+    /// Wait for Enter after each line.
+    #[arg(long, conflicts_with_all = ["verify", "speed", "json"])]
+    step: bool,
+    /// Print one JSON document at the end, and nothing else.
+    #[arg(long, conflicts_with = "speed")]
+    json: bool,
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    let factor = text.parse().ok();
+    let allowed = factor.filter(|factor: &f64| (1e-3..=1e6).contains(factor));
+    allowed.ok_or_else(|| "allowed is 0.001 to 1000000".to_owned())
+}
+
+/// What it prints with --json.
+#[derive(Debug, Serialize)]
+struct Document {
+    schema_version: u32,
+    recording: String,
+    graph: String,
+    /// True if something was compared, and nothing differs.
+    identical: bool,
+    /// Time of the recording that was computed, s; and how many times as fast as it was.
+    recorded_s: f64,
+    speed: f64,
+    is_cut: bool,
+    foreign_blocks: u64,
+    services: Vec<ComparedService>,
+    differences: Vec<ListedDifference>,
+    gaps: Vec<ListedGap>,
+}
+
+#[derive(Debug, Serialize)]
+struct ComparedService {
+    service: &'static str,
+    answers: u64,
+    compared: u64,
+    different: u64,
+    states: u64,
+    begun: u64,
+    gaps: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct ListedDifference {
+    service: &'static str,
+    t_unix_s: f64,
+    block_seq: u64,
+    field: String,
+    recorded: String,
+    computed: String,
+}
+
+#[derive(Debug, Serialize)]
+struct ListedGap {
+    service: &'static str,
+    t_unix_s: f64,
+    what: String,
+}
+
+/// What is told as it is computed.
+struct Teller<'a> {
+    args: &'a Args,
+    began: Instant,
+    /// The first moment, ns since 1970.
+    first_ns: Option<u64>,
+    last_ns: u64,
+    alarm: Option<bool>,
+    mode: Option<u32>,
+    action: Option<u32>,
+    differences: Vec<Difference>,
+    gaps: Vec<Gap>,
+}
+
+/// Computes it.
+///
+/// # Errors
+/// A recording that cannot be read, or of another version.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let mut replay = Replay::open(&args.recording).map_err(CommandError::usage)?;
+    let mut teller = Teller {
+        args,
+        began: Instant::now(),
+        first_ns: None,
+        last_ns: 0,
+        alarm: None,
+        mode: None,
+        action: None,
+        differences: Vec::new(),
+        gaps: Vec::new(),
+    };
+    while let Some(moment) = replay.next_moment().map_err(CommandError::failure)? {
+        teller.take(replay.setup(), moment)?;
+    }
+    let document = teller.document(&replay);
+    let is_identical = document.identical;
+    let printed = match args.json {
+        true => output::json(&document),
+        false => output::line(&summary(&document)),
+    };
+    printed.map_err(CommandError::failure)?;
+    Ok(match is_identical {
+        true => Outcome::Done,
+        false => Outcome::Failed,
+    })
+}
+
+impl Teller<'_> {
+    fn take(&mut self, setup: &Setup, moment: Moment) -> Result<(), CommandError> {
+        let Moment {
+            t_ns,
+            service,
+            what,
+        } = moment;
+        let first_ns = *self.first_ns.get_or_insert(t_ns);
+        self.last_ns = self.last_ns.max(t_ns);
+        if let Some(speed) = self.args.speed {
+            self.wait_until(t_ns.saturating_sub(first_ns) as f64 * 1e-9 / speed);
+        }
+        let told = match what {
+            What::Begins => Some(format!("{} begins to be computed", service.as_str())),
+            What::Answered(answer, difference) => {
+                let told = difference.map(|difference| self.differs(difference));
+                told.or_else(|| self.change(setup, &answer))
+            }
+            What::StateDiffers(difference) => Some(self.differs(difference)),
+            What::Gap(gap) => {
+                let told = format!("{}: gap: {}", service.as_str(), gap.what);
+                self.gaps.push(gap);
+                Some(told)
+            }
+        };
+        match told.filter(|_| !self.args.verify && !self.args.json) {
+            Some(text) => self.tell(t_ns, &text),
+            None => Ok(()),
+        }
+    }
+
+    fn tell(&self, t_ns: u64, text: &str) -> Result<(), CommandError> {
+        let first_ns = self.first_ns.unwrap_or(t_ns);
+        let time = unix_time_of_day(t_ns as f64 * 1e-9);
+        let since_s = (t_ns as f64 - first_ns as f64) * 1e-9;
+        let line = format!("{time} {since_s:9.3} s  {text}");
+        output::line(&line).map_err(CommandError::failure)?;
+        if self.args.step {
+            let mut entered = String::new();
+            let read = io::stdin().lock().read_line(&mut entered);
+            read.map_err(CommandError::failure)?;
+        }
+        Ok(())
+    }
+
+    /// Waits until so much time has passed since it began.
+    fn wait_until(&self, due_s: f64) {
+        let ahead_s = due_s - self.began.elapsed().as_secs_f64();
+        if ahead_s > 0.0 {
+            thread::sleep(Duration::from_secs_f64(ahead_s.min(WAIT_S_MAX)));
+        }
+    }
+
+    /// Keeps a difference, and says it once; further ones of the same service are many.
+    fn differs(&mut self, difference: Difference) -> String {
+        let Difference {
+            service,
+            field,
+            recorded,
+            computed,
+            ..
+        } = &difference;
+        let service = service.as_str();
+        let told = format!("{service}: differs: {field}: recorded {recorded}, computed {computed}");
+        if self.differences.len() < LISTED_MAX {
+            self.differences.push(difference);
+        }
+        told
+    }
+
+    /// What has changed, in words.
+    fn change(&mut self, setup: &Setup, answer: &Answer) -> Option<String> {
+        match answer {
+            Answer::Detection(belief) => {
+                let alarm = belief.alarm != 0;
+                let before = self.alarm.replace(alarm);
+                let word = match alarm {
+                    true => "alarm",
+                    false => "no alarm",
+                };
+                let p = belief.p_fault;
+                (before != Some(alarm)).then(|| format!("detector: {word}, p {p:.4}"))
+            }
+            Answer::Diagnosis(belief) => {
+                let before = self.mode.replace(belief.mode);
+                let (name, p) = (setup.tree.mode_name(belief.mode), belief.p_mode);
+                (before != Some(belief.mode)).then(|| format!("identifier: {name}, p {p:.3}"))
+            }
+            Answer::Action(action) => {
+                let before = self.action.replace(action.action);
+                let name = setup.decision.actions().get(action.action as usize);
+                let name = name.map_or("?", String::as_str);
+                (before != Some(action.action)).then(|| format!("supervisor: {name}"))
+            }
+        }
+    }
+
+    fn document(self, replay: &Replay) -> Document {
+        let services = ServiceName::STEPPING.map(|service| {
+            let tally: Tally = replay.tally(service);
+            ComparedService {
+                service: service.as_str(),
+                answers: tally.answers,
+                compared: tally.compared,
+                different: tally.different,
+                states: tally.states,
+                begun: tally.begun,
+                gaps: tally.gaps,
+            }
+        });
+        let first_ns = self.first_ns.unwrap_or(self.last_ns);
+        let recorded_s = (self.last_ns - first_ns) as f64 * 1e-9;
+        let unix_s = |t_ns: u64| t_ns as f64 * 1e-9;
+        let differences = self.differences.into_iter().map(|it| ListedDifference {
+            service: it.service.as_str(),
+            t_unix_s: unix_s(it.t_ns),
+            block_seq: it.block.seq,
+            field: it.field,
+            recorded: it.recorded,
+            computed: it.computed,
+        });
+        let gaps = self.gaps.into_iter().map(|it| ListedGap {
+            service: it.service.as_str(),
+            t_unix_s: unix_s(it.t_ns),
+            what: it.what,
+        });
+        let compared: u64 = services.iter().map(|it| it.compared).sum();
+        Document {
+            schema_version: 1,
+            recording: self.args.recording.display().to_string(),
+            graph: replay.setup().file.graph.name.clone(),
+            identical: compared > 0 && services.iter().all(|it| it.different == 0),
+            recorded_s,
+            speed: recorded_s / self.began.elapsed().as_secs_f64().max(1e-9),
+            is_cut: replay.is_cut(),
+            foreign_blocks: replay.foreign_count(),
+            services: services.into(),
+            differences: differences.collect(),
+            gaps: gaps.take(LISTED_MAX).collect(),
+        }
+    }
+}
+
+/// The result in a few lines.
+fn summary(document: &Document) -> String {
+    let mut text = format!(
+        "{:.1} s of graph {}, computed at {:.0} times their pace\n\n",
+        document.recorded_s, document.graph, document.speed
+    );
+    let heads = ["answers", "compared", "different", "states", "gaps"];
+    text += &format!("{:<12}", "service");
+    heads.iter().for_each(|head| text += &format!("{head:>10}"));
+    for it in &document.services {
+        text += &format!("\n{:<12}", it.service);
+        let figures = [it.answers, it.compared, it.different, it.states, it.gaps];
+        figures
+            .iter()
+            .for_each(|figure| text += &format!("{figure:>10}"));
+    }
+    for it in document.differences.iter().take(1) {
+        text += &format!(
+            "\n\nfirst difference: {} block {}: {}: recorded {}, computed {}",
+            it.service, it.block_seq, it.field, it.recorded, it.computed
+        );
+    }
+    for it in &document.gaps {
+        let time = unix_time_of_day(it.t_unix_s);
+        text += &format!("\ngap: {time} {}: {}", it.service, it.what);
+    }
+    if document.foreign_blocks > 0 {
+        text += &format!(
+            "\n{} blocks are of another version",
+            document.foreign_blocks
+        );
+    }
+    if document.is_cut {
+        text += "\nthe recording was cut short";
+    }
+    let compared: u64 = document.services.iter().map(|it| it.compared).sum();
+    text += match (document.identical, compared) {
+        (true, _) => "\n\nidentical to the last bit",
+        (false, 0) => "\n\nnothing could be compared: the recording holds no start and no state",
+        (false, _) => "\n\nNOT identical",
+    };
+    text
+}

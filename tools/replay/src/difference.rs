@@ -1,0 +1,101 @@
+//! Where two blocks are not the same.
+
+use vigil_blocks::layout::{Field, Layout};
+use vigil_blocks::{Block, BlockId};
+use vigil_cycle::topic::ServiceName;
+
+/// Fields that belong to the ports, not to the step.
+const OF_THE_PORTS: [&str; 3] = ["header", "cause", "valid_until_ns"];
+
+/// The first field in which a recorded block and the computed one differ.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Difference {
+    /// Whose answer it is.
+    pub service: ServiceName,
+    /// When it was published, ns since 1970.
+    pub t_ns: u64,
+    /// The recorded block; after which block of the journal, for a state.
+    pub block: BlockId,
+    /// Name of the field, with the element's index for an array; `state` for a state.
+    pub field: String,
+    /// What was recorded.
+    pub recorded: String,
+    /// What was computed.
+    pub computed: String,
+}
+
+/// Name and values of the first field that is not the same, bit by bit.
+pub(crate) fn first_difference<T: Block + Layout>(
+    recorded: &T,
+    computed: &T,
+) -> Option<[String; 3]> {
+    let (recorded, computed) = (bytemuck::bytes_of(recorded), bytemuck::bytes_of(computed));
+    let fields = T::FIELDS.iter();
+    let compared = fields.filter(|field| !OF_THE_PORTS.contains(&field.name));
+    compared.into_iter().find_map(|field| {
+        let range = field.offset..field.offset + field.size;
+        let (recorded, computed) = (recorded.get(range.clone())?, computed.get(range)?);
+        (recorded != computed).then(|| of_field(field, recorded, computed))
+    })
+}
+
+/// The first element that is not the same.
+fn of_field(field: &Field, recorded: &[u8], computed: &[u8]) -> [String; 3] {
+    let (is_array, element) = match field.type_text.strip_prefix('[') {
+        Some(array) => (true, array.split(';').next().unwrap_or_default()),
+        None => (false, field.type_text),
+    };
+    let size = match element {
+        "f64" | "u64" => 8,
+        "u32" => 4,
+        "u16" => 2,
+        "u8" => 1,
+        _ => 8.min(recorded.len()),
+    };
+    let pairs = recorded.chunks(size).zip(computed.chunks(size));
+    let found = pairs.enumerate().find(|(_, (a, b))| a != b);
+    let (index, (a, b)) = found.unwrap_or((0, (recorded, computed)));
+    let name = match is_array {
+        true => format!("{}[{index}]", field.name),
+        false => field.name.to_owned(),
+    };
+    [name, number(element, a), number(element, b)]
+}
+
+/// A number in words; bytes of anything else.
+fn number(of: &str, bytes: &[u8]) -> String {
+    let mut wide = [0; 8];
+    wide.iter_mut()
+        .zip(bytes)
+        .for_each(|(to, byte)| *to = *byte);
+    let whole = u64::from_le_bytes(wide);
+    match of {
+        "f64" => format!("{:?} ({whole:016x})", f64::from_bits(whole)),
+        "u64" | "u32" | "u16" | "u8" => whole.to_string(),
+        _ => format!("bytes {whole:016x}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vigil_blocks::DetectionBelief;
+
+    #[test]
+    fn the_first_field_that_differs_is_named() {
+        let recorded = DetectionBelief::default();
+        let mut computed = recorded;
+        computed.header.seq = 7;
+        assert_eq!(first_difference(&recorded, &computed), None);
+        computed.alarm_count = 3;
+        computed.channel_log_odds[2] = -0.0;
+        let [name, before, after] = first_difference(&recorded, &computed).unwrap();
+        assert_eq!(name, "channel_log_odds[2]");
+        let bits = (before.as_str(), after.as_str());
+        assert_eq!(bits, ("0.0 (0000000000000000)", "-0.0 (8000000000000000)"));
+        computed.channel_log_odds[2] = 0.0;
+        let [name, before, after] = first_difference(&recorded, &computed).unwrap();
+        let said = (name.as_str(), before.as_str(), after.as_str());
+        assert_eq!(said, ("alarm_count", "0", "3"));
+    }
+}

@@ -1,0 +1,357 @@
+//! A recording that is computed again.
+
+use std::collections::VecDeque;
+use std::path::Path;
+
+use vigil_blocks::{Action, Block, BlockId, CheckpointPart, DetectionBelief, FaultBelief, Journal};
+use vigil_cycle::Topic;
+use vigil_cycle::topic::ServiceName;
+use vigil_flight::{FlightReader, Recorded, read_block};
+use vigil_setup::{Document, Setup};
+
+use crate::blocks::{Blocks, Window};
+use crate::course::{Course, Gap, Standing, Tally, begins};
+use crate::difference::{Difference, first_difference};
+use crate::error::ReplayError;
+use crate::step::{Answers, Step};
+
+/// What lies so far ahead in the file is read before a step is computed, ns: recordings hold
+/// topics one after the other, and states in parts.
+const AHEAD_NS: u64 = 10_000_000_000;
+/// Who takes the detector's answers is computed so much later, ns: their journals may be published
+/// first.
+const BEHIND_NS: u64 = 200_000_000;
+/// Bytes of a state at most.
+const STATE_BYTES_MAX: usize = 16 << 20;
+
+/// What was computed.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Answer {
+    /// The detector's.
+    Detection(Box<DetectionBelief>),
+    /// The identifier's.
+    Diagnosis(Box<FaultBelief>),
+    /// The supervisor's.
+    Action(Box<Action>),
+}
+
+/// What happened at a moment of the replay.
+#[derive(Debug, Clone, PartialEq)]
+pub enum What {
+    /// The step gave an answer; the difference from the recorded one, if that is another.
+    Answered(Answer, Option<Difference>),
+    /// The step begins: with the service, or with a state that it has handed out.
+    Begins,
+    /// The state is not the one that the service has handed out.
+    StateDiffers(Difference),
+    /// Something was not recorded.
+    Gap(Gap),
+}
+
+/// A moment of the replay.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Moment {
+    /// When it was, ns since 1970.
+    pub t_ns: u64,
+    /// Whose step.
+    pub service: ServiceName,
+    /// What.
+    pub what: What,
+}
+
+/// A recording that is computed again.
+pub struct Replay {
+    file: FlightReader,
+    setup: Setup,
+    courses: [Course; 3],
+    blocks: Blocks,
+    answers: Answers,
+    moments: VecDeque<Moment>,
+    /// Up to here the file is read, ns; without end at its end.
+    read_ns: u64,
+    /// Blocks that could not be read.
+    foreign_count: u64,
+    /// Room for a state.
+    state: Box<[u8]>,
+}
+
+impl Replay {
+    /// Opens a recording, and builds the steps that the graph ran.
+    ///
+    /// # Errors
+    /// [`ReplayError`].
+    pub fn open(path: &Path) -> Result<Self, ReplayError> {
+        let file = FlightReader::open(path)?;
+        let text = file.document().map(str::to_owned);
+        let text = text.ok_or_else(|| ReplayError::NoDocument(path.to_owned()))?;
+        let setup = Document::from_text(path, text)?.check()?;
+        let course = |service| Step::new(service, &setup).map(|step| Course::new(service, step));
+        let [first, second, third] = ServiceName::STEPPING;
+        Ok(Self {
+            file,
+            courses: [course(first)?, course(second)?, course(third)?],
+            blocks: Blocks::new(2 * AHEAD_NS, 5 * BEHIND_NS),
+            answers: Answers::default(),
+            moments: VecDeque::new(),
+            read_ns: 0,
+            foreign_count: 0,
+            state: vec![0; STATE_BYTES_MAX].into_boxed_slice(),
+            setup,
+        })
+    }
+
+    /// What the graph ran on.
+    #[must_use]
+    pub const fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// What became of a service's answers so far.
+    #[must_use]
+    pub fn tally(&self, service: ServiceName) -> Tally {
+        let found = self.courses.iter().find(|course| course.service == service);
+        found.map_or_else(Tally::default, |course| course.tally)
+    }
+
+    /// True if the file was cut short.
+    #[must_use]
+    pub const fn is_cut(&self) -> bool {
+        self.file.is_cut()
+    }
+
+    /// Blocks of another version, which nothing can be computed from.
+    #[must_use]
+    pub const fn foreign_count(&self) -> u64 {
+        self.file.foreign_count() + self.foreign_count
+    }
+
+    /// What comes next; `None` at the end.
+    ///
+    /// # Errors
+    /// The file's.
+    pub fn next_moment(&mut self) -> Result<Option<Moment>, ReplayError> {
+        loop {
+            if let Some(moment) = self.moments.pop_front() {
+                return Ok(Some(moment));
+            }
+            if let Some(place) = self.due() {
+                self.turn(place)?;
+            } else if self.read_ns == u64::MAX {
+                return Ok(None);
+            } else {
+                self.read()?;
+            }
+        }
+    }
+
+    /// Reads on in the file.
+    fn read(&mut self) -> Result<(), ReplayError> {
+        let Some(recorded) = self.file.next()? else {
+            self.read_ns = u64::MAX;
+            return Ok(());
+        };
+        let Recorded::Block {
+            topic,
+            log_time_ns,
+            bytes,
+        } = recorded
+        else {
+            return Ok(());
+        };
+        self.read_ns = self.read_ns.max(log_time_ns);
+        let course = |service: ServiceName| move |course: &&mut Course| course.service == service;
+        match topic {
+            Topic::Journal(service) => {
+                let found = self.courses.iter_mut().find(course(service));
+                match found.zip(read_block::<Journal>(bytes)) {
+                    Some((course, block)) => course.journal.push_back((log_time_ns, block)),
+                    None => self.foreign_count += 1,
+                }
+            }
+            Topic::Checkpoint(service) => {
+                let found = self.courses.iter_mut().find(course(service));
+                match found.zip(read_block::<CheckpointPart>(bytes)) {
+                    Some((course, part)) => course.checkpoints.take(&part),
+                    None => self.foreign_count += 1,
+                }
+            }
+            _ => {
+                let is_ours = self.blocks.take(topic, log_time_ns, bytes);
+                self.foreign_count += u64::from(!is_ours);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whose journal goes on: the oldest block of all, if enough of the file is read.
+    fn due(&self) -> Option<usize> {
+        let heads = self
+            .courses
+            .iter()
+            .enumerate()
+            .filter_map(|(place, course)| {
+                let (t_ns, _) = course.journal.front()?;
+                let behind_ns = match place {
+                    0 => 0,
+                    _ => BEHIND_NS,
+                };
+                Some((t_ns + behind_ns, place))
+            });
+        let (t_ns, place) = heads.min()?;
+        (t_ns.saturating_add(AHEAD_NS) <= self.read_ns).then_some(place)
+    }
+
+    /// Computes one block of a journal.
+    fn turn(&mut self, place: usize) -> Result<(), ReplayError> {
+        let Some((t_ns, block)) = self.courses[place].journal.pop_front() else {
+            return Ok(());
+        };
+        let course = &mut self.courses[place];
+        let service = course.service;
+        if let Some(what) = course.follow(&block) {
+            self.gap(place, t_ns, what);
+        }
+        for entry in block.used() {
+            let course = &mut self.courses[place];
+            if begins(entry) {
+                course.step = Step::new(service, &self.setup)?;
+                course.standing = Standing::Following;
+                course.tally.begun += 1;
+                self.note(t_ns, service, What::Begins);
+            } else if course.standing == Standing::Following {
+                let taken = course.step.take(entry, &self.blocks, &mut self.answers);
+                if let Err(missing) = taken {
+                    self.gap(place, t_ns, missing.as_str());
+                }
+            }
+        }
+        if let Some(id) = block.answer() {
+            self.answer(place, t_ns, id);
+        }
+        self.compare_state(place, t_ns, block.header.id());
+        Ok(())
+    }
+
+    fn note(&mut self, t_ns: u64, service: ServiceName, what: What) {
+        self.moments.push_back(Moment {
+            t_ns,
+            service,
+            what,
+        });
+    }
+
+    /// Something is missing: the service waits, if it does not wait already.
+    fn gap(&mut self, place: usize, t_ns: u64, what: &str) {
+        let standing = &mut self.courses[place].standing;
+        if std::mem::replace(standing, Standing::Waiting) == Standing::Following {
+            self.tell_gap(place, t_ns, what);
+        }
+    }
+
+    fn tell_gap(&mut self, place: usize, t_ns: u64, what: &str) {
+        let course = &mut self.courses[place];
+        course.tally.gaps += 1;
+        let service = course.service;
+        let gap = Gap {
+            service,
+            t_ns,
+            what: what.to_owned(),
+        };
+        self.note(t_ns, service, What::Gap(gap));
+    }
+
+    /// Compares an answer with what was published.
+    fn answer(&mut self, place: usize, t_ns: u64, id: BlockId) {
+        let course = &mut self.courses[place];
+        course.tally.answers += 1;
+        if course.standing == Standing::Waiting {
+            return;
+        }
+        let (blocks, answers) = (&mut self.blocks, &mut self.answers);
+        let (answer, compared) = match place {
+            0 => {
+                let particles = answers.particles.clone();
+                blocks.particles.insert(id, t_ns, particles);
+                let answer = std::mem::take(&mut answers.detection);
+                let compared = compared(&blocks.detections, id, &*answer);
+                (Answer::Detection(answer), compared)
+            }
+            1 => {
+                let answer = std::mem::take(&mut answers.diagnosis);
+                let compared = compared(&blocks.diagnoses, id, &*answer);
+                (Answer::Diagnosis(answer), compared)
+            }
+            _ => {
+                let answer = std::mem::take(&mut answers.action);
+                let compared = compared(&blocks.actions, id, &*answer);
+                (Answer::Action(answer), compared)
+            }
+        };
+        let service = course.service;
+        course.tally.compared += u64::from(compared.is_some());
+        let difference = compared
+            .flatten()
+            .map(|[field, recorded, computed]| Difference {
+                service,
+                t_ns,
+                block: id,
+                field,
+                recorded,
+                computed,
+            });
+        course.tally.different += u64::from(difference.is_some());
+        self.note(t_ns, service, What::Answered(answer, difference));
+    }
+
+    /// Compares the state with the one that the service has handed out after this block, or begins
+    /// with it.
+    fn compare_state(&mut self, place: usize, t_ns: u64, id: BlockId) {
+        // Its first input is what the detector answers from then on.
+        let can_begin = place != 1 || self.courses[0].standing == Standing::Following;
+        let course = &mut self.courses[place];
+        let service = course.service;
+        let Some(recorded) = course.checkpoints.after(id) else {
+            return;
+        };
+        if course.standing == Standing::Waiting && !can_begin {
+            return;
+        }
+        if course.standing == Standing::Following {
+            let computed = course.step.state(&mut self.state);
+            course.tally.states += 1;
+            if computed == Some(recorded.bytes.as_slice()) {
+                return;
+            }
+            let size = |bytes: usize| format!("{bytes} bytes");
+            let difference = Difference {
+                service,
+                t_ns,
+                block: id,
+                field: "state".to_owned(),
+                recorded: size(recorded.bytes.len()),
+                computed: size(computed.map_or(0, <[u8]>::len)),
+            };
+            course.tally.different += 1;
+            self.note(t_ns, service, What::StateDiffers(difference));
+        }
+        let course = &mut self.courses[place];
+        match course.step.load(&recorded.bytes) {
+            Ok(()) => {
+                course.standing = Standing::Following;
+                course.tally.begun += 1;
+                self.note(t_ns, service, What::Begins);
+            }
+            Err(error) => self.tell_gap(place, t_ns, &error.to_string()),
+        }
+    }
+}
+
+/// What differs, if anything does; `None` if the block was not recorded.
+fn compared<T: Block + vigil_blocks::layout::Layout>(
+    recorded: &Window<T>,
+    id: BlockId,
+    computed: &T,
+) -> Option<Option<[String; 3]>> {
+    let recorded = recorded.get(id)?;
+    Some(first_difference(recorded, computed))
+}

@@ -1,0 +1,207 @@
+//! A service's step, as the service builds it, fed with entries of its journal.
+
+use vigil_blocks::{
+    Action, DetectionBelief, Entry, FaultBelief, JournalEntry, JournalKind, ParticleBlock,
+};
+use vigil_checkpoint::{Checkpoint, CheckpointError, CheckpointReader, CheckpointWriter};
+use vigil_cycle::topic::ServiceName;
+use vigil_decision::{Inputs, Supervisor};
+use vigil_diagnosis::detect::Detector;
+use vigil_diagnosis::identify::{Diagnoser, Input};
+use vigil_setup::Setup;
+
+use crate::blocks::Blocks;
+use crate::error::ReplayError;
+
+/// What steps write.
+#[derive(Default)]
+pub(crate) struct Answers {
+    pub(crate) detection: Box<DetectionBelief>,
+    pub(crate) particles: Box<ParticleBlock>,
+    pub(crate) diagnosis: Box<FaultBelief>,
+    hypotheses: Box<ParticleBlock>,
+    pub(crate) action: Box<Action>,
+}
+
+/// A block that an entry names was not recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Missing {
+    Frame,
+    Detection,
+    Hypotheses,
+    Diagnosis,
+}
+
+impl Missing {
+    pub(crate) const fn as_str(self) -> &'static str {
+        match self {
+            Self::Frame => "a sensor frame was not recorded",
+            Self::Detection => "a detection was not recorded",
+            Self::Hypotheses => "the detector's hypotheses are not known",
+            Self::Diagnosis => "a diagnosis was not recorded",
+        }
+    }
+}
+
+/// The step of a service.
+pub(crate) enum Step {
+    Detector(Box<Detector>),
+    Identifier(Box<Diagnoser>),
+    Supervisor(Box<Supervisor>),
+}
+
+impl Step {
+    /// The step at the start of a service, which is one of those that step.
+    pub(crate) fn new(service: ServiceName, setup: &Setup) -> Result<Self, ReplayError> {
+        let refused = |error: String| ReplayError::Build {
+            service: service.as_str(),
+            reason: error,
+        };
+        Ok(match service {
+            ServiceName::Identifier => {
+                let step = vigil_identifier::assemble(setup);
+                Self::Identifier(Box::new(step.map_err(|error| refused(error.to_string()))?))
+            }
+            ServiceName::Supervisor => {
+                let step = vigil_supervisor::assemble(setup);
+                Self::Supervisor(Box::new(step.map_err(|error| refused(error.to_string()))?))
+            }
+            ServiceName::SensorSim | ServiceName::Detector => {
+                let step = vigil_detector::assemble(setup);
+                Self::Detector(Box::new(step.map_err(|error| refused(error.to_string()))?))
+            }
+        })
+    }
+
+    /// Takes an entry, as the service did.
+    pub(crate) fn take(
+        &mut self,
+        entry: &JournalEntry,
+        blocks: &Blocks,
+        to: &mut Answers,
+    ) -> Result<(), Missing> {
+        let Some(kind) = JournalKind::from_repr(entry.kind) else {
+            return Ok(());
+        };
+        match self {
+            Self::Detector(detector) => detect(detector, kind, entry, (blocks, to)),
+            Self::Identifier(identifier) => identify(identifier, kind, entry, (blocks, to)),
+            Self::Supervisor(supervisor) => decide(supervisor, kind, entry, (blocks, to)),
+        }
+    }
+
+    /// The state as bytes, in `room`; `None` if it is larger.
+    pub(crate) fn state<'a>(&self, room: &'a mut [u8]) -> Option<&'a [u8]> {
+        let mut writer = CheckpointWriter::new(room);
+        match self {
+            Self::Detector(detector) => detector.save(&mut writer),
+            Self::Identifier(identifier) => identifier.save(&mut writer),
+            Self::Supervisor(supervisor) => supervisor.save(&mut writer),
+        }
+        let bytes = writer.finish().ok()?;
+        room.get(..bytes)
+    }
+
+    /// Takes over a state.
+    pub(crate) fn load(&mut self, state: &[u8]) -> Result<(), CheckpointError> {
+        let mut reader = CheckpointReader::new(state);
+        match self {
+            Self::Detector(detector) => detector.load(&mut reader),
+            Self::Identifier(identifier) => identifier.load(&mut reader),
+            Self::Supervisor(supervisor) => supervisor.load(&mut reader),
+        }
+        reader.finish()
+    }
+}
+
+fn detect(
+    detector: &mut Detector,
+    kind: JournalKind,
+    entry: &JournalEntry,
+    (blocks, to): (&Blocks, &mut Answers),
+) -> Result<(), Missing> {
+    let (belief, particles) = (&mut to.detection, &mut to.particles);
+    match kind {
+        JournalKind::Frame => {
+            let frame = entry.input().and_then(|id| blocks.frames.get(id));
+            let frame = frame.ok_or(Missing::Frame)?;
+            detector.step(Entry::Frame(frame), belief, particles);
+        }
+        JournalKind::Missed => detector.step(Entry::Missed(entry.count), belief, particles),
+        JournalKind::Budget => detector.step(Entry::Budget(entry.count), belief, particles),
+        JournalKind::Reset => detector.step(Entry::Reset, belief, particles),
+        JournalKind::Refused => detector.refuse(),
+        JournalKind::Begun | JournalKind::Looked => {}
+    }
+    Ok(())
+}
+
+fn identify(
+    identifier: &mut Diagnoser,
+    kind: JournalKind,
+    entry: &JournalEntry,
+    (blocks, to): (&Blocks, &mut Answers),
+) -> Result<(), Missing> {
+    let detection = |id| blocks.detections.get(id).ok_or(Missing::Detection);
+    let (belief, out) = (&mut to.diagnosis, &mut to.hypotheses);
+    match kind {
+        JournalKind::Frame => {
+            let frame = entry.input().and_then(|id| blocks.frames.get(id));
+            let detected = match entry.detection() {
+                Some(id) => {
+                    let particles = blocks.particles.get(id).ok_or(Missing::Hypotheses)?;
+                    Some((detection(id)?, particles))
+                }
+                None => None,
+            };
+            let input = Input {
+                frame: frame.ok_or(Missing::Frame)?,
+                detection: detected,
+            };
+            identifier.step(Entry::Frame(input), belief, out);
+        }
+        JournalKind::Looked => {
+            let id = entry.detection().ok_or(Missing::Detection)?;
+            identifier.look(detection(id)?);
+        }
+        JournalKind::Missed => identifier.step(Entry::Missed(entry.count), belief, out),
+        JournalKind::Budget => identifier.step(Entry::Budget(entry.count), belief, out),
+        JournalKind::Reset => identifier.step(Entry::Reset, belief, out),
+        JournalKind::Begun | JournalKind::Refused => {}
+    }
+    Ok(())
+}
+
+fn decide(
+    supervisor: &mut Supervisor,
+    kind: JournalKind,
+    entry: &JournalEntry,
+    (blocks, to): (&Blocks, &mut Answers),
+) -> Result<(), Missing> {
+    let action = &mut to.action;
+    match kind {
+        JournalKind::Frame => {
+            let diagnosis = entry.input().map(|id| blocks.diagnoses.get(id));
+            let diagnosis = diagnosis.map(|found| found.ok_or(Missing::Diagnosis));
+            let detection = match entry.detection() {
+                Some(id) => {
+                    let recorded = blocks.detections.get(id).ok_or(Missing::Detection)?;
+                    let mut taken = Box::new(*recorded);
+                    taken.blind = entry.blind;
+                    Some(taken)
+                }
+                None => None,
+            };
+            let inputs = Inputs {
+                diagnosis: diagnosis.transpose()?,
+                detection: detection.as_deref(),
+            };
+            supervisor.step(Entry::Frame(inputs), action);
+        }
+        JournalKind::Missed => supervisor.step(Entry::Missed(entry.count), action),
+        JournalKind::Budget => supervisor.step(Entry::Budget(entry.count), action),
+        JournalKind::Reset => supervisor.step(Entry::Reset, action),
+        JournalKind::Begun | JournalKind::Looked | JournalKind::Refused => {}
+    }
+    Ok(())
+}
