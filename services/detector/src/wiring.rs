@@ -149,15 +149,16 @@ impl Stage for DetectorStage {
                 if before != 0 && before != self.epoch {
                     // A publisher that starts anew may have another clock.
                     self.detector.step(Entry::Reset, belief, hypotheses);
-                    self.journal.note(JournalEntry::of(JournalKind::Reset, 0));
+                    self.journal.note(JournalEntry::new(JournalKind::Reset, 0));
                 }
                 self.detector.step(Entry::Frame(&frame), belief, hypotheses);
-                let entry = JournalEntry::of(JournalKind::Frame, 1);
+                let entry = JournalEntry::new(JournalKind::Frame, 1);
                 self.journal.note(entry.with_input(frame.header.id()));
                 intake.stepped(&frame.header, frame.header.id());
             } else {
                 self.detector.refuse();
-                self.journal.note(JournalEntry::of(JournalKind::Refused, 1));
+                self.journal
+                    .note(JournalEntry::new(JournalKind::Refused, 1));
             }
         }
     }
@@ -166,7 +167,7 @@ impl Stage for DetectorStage {
         let (belief, hypotheses) = (self.belief.block(), self.hypotheses.block());
         self.detector.step(Entry::Missed(count), belief, hypotheses);
         self.journal
-            .note(JournalEntry::of(JournalKind::Missed, count));
+            .note(JournalEntry::new(JournalKind::Missed, count));
     }
 
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {

@@ -152,10 +152,10 @@ impl IdentifierStage {
             let before = std::mem::replace(&mut self.epoch, frame.header.epoch);
             if before != 0 && before != self.epoch {
                 self.identifier.step(Entry::Reset, belief, out);
-                self.journal.note(JournalEntry::of(JournalKind::Reset, 0));
+                self.journal.note(JournalEntry::new(JournalKind::Reset, 0));
             }
             self.identifier.step(Entry::Frame(input), belief, out);
-            let mut entry = JournalEntry::of(JournalKind::Frame, 1).with_input(frame.header.id());
+            let mut entry = JournalEntry::new(JournalKind::Frame, 1).with_input(frame.header.id());
             if let Some((detection, _)) = detection {
                 entry = entry.with_detection(detection.header.id(), detection.blind);
             }
@@ -185,7 +185,7 @@ impl Stage for IdentifierStage {
                 continue;
             }
             self.identifier.look(detection);
-            let entry = JournalEntry::of(JournalKind::Looked, 0);
+            let entry = JournalEntry::new(JournalKind::Looked, 0);
             self.journal
                 .note(entry.with_detection(header.id(), detection.blind));
             let newest = header.id();
@@ -209,7 +209,7 @@ impl Stage for IdentifierStage {
         let (belief, out) = (self.belief.block(), self.hypotheses.block());
         self.identifier.step(Entry::Missed(count), belief, out);
         self.journal
-            .note(JournalEntry::of(JournalKind::Missed, count));
+            .note(JournalEntry::new(JournalKind::Missed, count));
     }
 
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
@@ -255,7 +255,7 @@ impl Stage for IdentifierStage {
         let (belief, out) = (self.belief.block(), self.hypotheses.block());
         self.identifier.step(Entry::Budget(particles), belief, out);
         self.journal
-            .note(JournalEntry::of(JournalKind::Budget, particles));
+            .note(JournalEntry::new(JournalKind::Budget, particles));
     }
 
     fn has_input(&self) -> bool {

@@ -158,7 +158,7 @@ impl SupervisorStage {
 
 /// What the step takes, by name.
 fn journal_entry(inputs: Inputs<'_>) -> JournalEntry {
-    let mut entry = JournalEntry::of(JournalKind::Frame, 1);
+    let mut entry = JournalEntry::new(JournalKind::Frame, 1);
     if let Some(diagnosis) = inputs.diagnosis {
         entry = entry.with_input(diagnosis.header.id());
     }
@@ -196,7 +196,7 @@ impl Stage for SupervisorStage {
         self.supervisor
             .step(Entry::Missed(count), self.action.block());
         self.journal
-            .note(JournalEntry::of(JournalKind::Missed, count));
+            .note(JournalEntry::new(JournalKind::Missed, count));
         if self.detection_is_new {
             let inputs = Inputs {
                 diagnosis: None,

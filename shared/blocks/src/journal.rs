@@ -73,7 +73,7 @@ pub struct JournalEntry, size 48 {
 impl JournalEntry {
     /// An entry without input.
     #[must_use]
-    pub fn of(kind: JournalKind, count: u32) -> Self {
+    pub fn new(kind: JournalKind, count: u32) -> Self {
         Self {
             kind: kind as u32,
             count,

@@ -3,8 +3,8 @@
 use nalgebra::{Complex, SMatrix};
 
 use crate::reader::CheckpointReader;
+use crate::state::{Checkpoint, CheckpointValue};
 use crate::writer::CheckpointWriter;
-use crate::{Checkpoint, CheckpointValue};
 
 impl<const R: usize, const C: usize> Checkpoint for SMatrix<f64, R, C> {
     fn save(&self, to: &mut CheckpointWriter<'_>) {

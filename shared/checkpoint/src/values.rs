@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use rand_pcg::Pcg64Mcg;
 
 use crate::reader::CheckpointReader;
+use crate::state::{Checkpoint, CheckpointValue};
 use crate::writer::CheckpointWriter;
-use crate::{Checkpoint, CheckpointValue};
 
 macro_rules! numbers {
     ($($number:ty),*) => {$(

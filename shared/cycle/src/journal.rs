@@ -44,7 +44,7 @@ impl JournalWriter {
     /// The transport's.
     pub fn open(graph: &Graph, service: ServiceName) -> Result<Self, PortError> {
         let mut entries = Vec::with_capacity(ENTRIES_MAX);
-        entries.push(JournalEntry::of(JournalKind::Begun, 0));
+        entries.push(JournalEntry::new(JournalKind::Begun, 0));
         Ok(Self {
             journal: graph.sender(Topic::Journal(service))?,
             parts: graph.sender(Topic::Checkpoint(service))?,
@@ -182,10 +182,10 @@ mod tests {
         let sender = graph.sender::<vigil_blocks::Truth>(Topic::Truth).unwrap();
         let clock = VirtualClock::default();
         for count in 0..10 {
-            writer.note(JournalEntry::of(JournalKind::Missed, count));
+            writer.note(JournalEntry::new(JournalKind::Missed, count));
         }
         writer.answer(&*sender);
-        writer.note(JournalEntry::of(JournalKind::Budget, 5));
+        writer.note(JournalEntry::new(JournalKind::Budget, 5));
         writer.publish(&0_u64, stamp(0), &clock).unwrap();
         let mut blocks = Vec::new();
         while let Some(block) = received.take_next() {
@@ -233,7 +233,7 @@ mod tests {
     fn entries_without_room_are_counted() {
         let (mut writer, mut received, _) = journal();
         for _ in 0..ENTRIES_MAX + 4 {
-            writer.note(JournalEntry::of(JournalKind::Refused, 0));
+            writer.note(JournalEntry::new(JournalKind::Refused, 0));
         }
         let clock = VirtualClock::default();
         writer.publish(&0_u64, stamp(0), &clock).unwrap();

@@ -25,9 +25,14 @@ use rand_pcg::Pcg64Mcg;
 use vigil_checkpoint::{Checkpoint, CheckpointValue};
 
 use crate::filter::{Event, Filter, SUM_TOLERANCE, Step};
-use crate::hybrid::{self, ModelError, Modes, Sampled};
+use crate::hybrid::{self, Sampled};
 use crate::resample::{Resampling, systematic};
 use crate::weights::Weights;
+
+mod nodes;
+
+pub use nodes::HierarchyError;
+use nodes::{Node, arrange};
 
 /// Share below a node above which it is split, and share below which it is merged. Chosen by hand:
 /// the remainders differ by a factor of ten, so that a node does not toggle; the rule is within the
@@ -37,40 +42,6 @@ const MERGE: f64 = 0.99;
 /// A node with the mass of fewer particles than this is merged: too few to distinguish leaves.
 /// Chosen by hand; more merges nodes of rare faults, less splits by chance.
 const PARTICLES_MIN: f64 = 3.0;
-
-/// Why a hierarchy was refused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum HierarchyError {
-    /// The model is refused.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// An abstract node needs two modes at least, none of them the nominal one.
-    #[error("abstract node {0} needs two or more modes other than the nominal one")]
-    Node(usize),
-    /// A mode does not exist.
-    #[error("mode {mode} of abstract node {node} does not exist")]
-    Mode {
-        /// Index of the abstract node.
-        node: usize,
-        /// Index of the mode.
-        mode: usize,
-    },
-    /// Two nodes share some modes, and neither lies below the other.
-    #[error("abstract nodes {0} and {1} overlap: one must contain the other, or none of its modes")]
-    Overlap(usize, usize),
-}
-
-#[derive(Debug, Clone, Checkpoint)]
-struct Node {
-    #[checkpoint(fixed)]
-    leaves: Vec<usize>,
-    /// Nodes directly below, and leaves below none of them.
-    #[checkpoint(fixed)]
-    nodes_below: Vec<usize>,
-    #[checkpoint(fixed)]
-    leaves_below: Vec<usize>,
-    merged: bool,
-}
 
 /// The hierarchical filter over the modes and states of `M`.
 #[derive(Debug, Clone, Checkpoint)]
@@ -385,58 +356,6 @@ impl<M: Sampled> Hierarchical<M> {
             }
         }
     }
-}
-
-/// Nodes and, for each mode, the nodes above it from the top.
-fn arrange(
-    model: &impl Modes,
-    abstract_nodes: &[Vec<usize>],
-) -> Result<(Vec<Node>, Vec<Vec<usize>>), HierarchyError> {
-    let modes = model.modes();
-    let mut above: Vec<Vec<usize>> = vec![Vec::new(); modes];
-    for (node, leaves) in abstract_nodes.iter().enumerate() {
-        if leaves.len() < 2 || leaves.contains(&0) {
-            return Err(HierarchyError::Node(node));
-        }
-        for &mode in leaves {
-            let Some(above) = above.get_mut(mode) else {
-                return Err(HierarchyError::Mode { node, mode });
-            };
-            above.push(node);
-        }
-        for (other, others) in abstract_nodes[..node].iter().enumerate() {
-            let shared = leaves.iter().filter(|mode| others.contains(mode)).count();
-            let nested = shared == leaves.len().min(others.len()) && leaves.len() != others.len();
-            if shared > 0 && !nested {
-                return Err(HierarchyError::Overlap(other, node));
-            }
-        }
-    }
-    for nodes in &mut above {
-        nodes.sort_by_key(|&node| std::cmp::Reverse(abstract_nodes[node].len()));
-    }
-    // The node directly above a mode (of size 1), or above a node, which its first mode stands for.
-    let next_above = |mode: usize, size: usize| {
-        let larger = above[mode].iter().rev();
-        larger
-            .copied()
-            .find(|&node| abstract_nodes[node].len() > size)
-    };
-    let nodes = abstract_nodes.iter().enumerate().map(|(index, leaves)| {
-        let others = abstract_nodes.iter().enumerate();
-        let nodes_below = others.filter(|(_, o)| next_above(o[0], o.len()) == Some(index));
-        let leaves_below = leaves.iter().copied();
-        Node {
-            nodes_below: nodes_below.map(|(other, _)| other).collect(),
-            leaves_below: leaves_below
-                .filter(|&k| next_above(k, 1) == Some(index))
-                .collect(),
-            leaves: leaves.clone(),
-            merged: true,
-        }
-    });
-    let nodes = nodes.collect();
-    Ok((nodes, above))
 }
 
 /// Index drawn by probabilities that sum to 1.

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use vigil_blocks::{
     DetectionBelief, Entry, FaultBelief, HealthyBelief, MODE_UNKNOWN, ParticleBlock, SensorFrame,
 };
-use vigil_checkpoint::{Checkpoint, CheckpointValue};
+use vigil_checkpoint::Checkpoint;
 use vigil_robot::FaultPrior;
 use vigil_robot::learned::{Healthy, Observer, motion_modes};
 
@@ -18,6 +18,7 @@ use crate::identify::leaf_map::{IdentifierError, LeafMap};
 use crate::identify::models::Models;
 use crate::identify::multiple_hypothesis::MultipleHypothesis;
 use crate::identify::node_sizes::NodeSizes;
+use crate::identify::phase::Phase;
 use crate::identify::reported::ReportedFault;
 use crate::identify::ring::{Ring, RingEntry};
 use crate::identify::settings::{IdentifierFilter, Settings};
@@ -45,15 +46,6 @@ pub struct Input<'a> {
     pub frame: &'a SensorFrame,
     /// The detector's belief and hypotheses of the same frame, if they are known.
     pub detection: Option<(&'a DetectionBelief, &'a ParticleBlock)>,
-}
-
-/// What the identifier is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, CheckpointValue)]
-enum Phase {
-    /// No alarm, no fault believed.
-    Watching,
-    /// The next observation of the ring to take has this index.
-    Identifying(usize),
 }
 
 /// The identification filter at frame rate.

@@ -20,8 +20,8 @@ const WAIT_S_MAX: f64 = 10.0;
 /// Computes again what a recorded graph believed and did, and compares it bit by bit.
 ///
 /// Prints each change of alarm, name and action as it is computed, and what differs from the
-/// recording. A service is computed from its start, or from the first state that it handed out. What
-/// was not recorded is named, and the service waits for its next state.
+/// recording. A service is computed from its start, or from the first state that it handed out.
+/// What was not recorded is named, and the service waits for its next state.
 ///
 /// Ends with 1 if anything differs, or nothing could be compared.
 #[derive(Debug, clap::Args)]
