@@ -75,6 +75,12 @@ impl<'a> CheckpointReader<'a> {
         length
     }
 
+    /// True as long as everything has fitted.
+    #[must_use]
+    pub const fn is_sound(&self) -> bool {
+        self.failure.is_none()
+    }
+
     /// What was read does not fit `type_name`.
     pub const fn fail(&mut self, type_name: &'static str) {
         if self.failure.is_none() {

@@ -128,7 +128,8 @@ impl<T: CheckpointValue> Checkpoint for Vec<T> {
     fn load(&mut self, from: &mut CheckpointReader<'_>) {
         self.clear();
         let length = from.length("Vec");
-        self.extend((0..length).map(|_| T::read(from)));
+        // Nothing more after a misfit: a length alone takes no memory.
+        self.extend((0..length).map_while(|_| from.is_sound().then(|| T::read(from))));
     }
 }
 
@@ -149,7 +150,8 @@ impl<T: CheckpointValue> Checkpoint for VecDeque<T> {
     fn load(&mut self, from: &mut CheckpointReader<'_>) {
         self.clear();
         let length = from.length("VecDeque");
-        self.extend((0..length).map(|_| T::read(from)));
+        // Nothing more after a misfit: a length alone takes no memory.
+        self.extend((0..length).map_while(|_| from.is_sound().then(|| T::read(from))));
     }
 }
 

@@ -1,6 +1,7 @@
 //! A recording that is computed again.
 
 use std::collections::VecDeque;
+use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
 
 use vigil_blocks::{Action, Block, BlockId, CheckpointPart, DetectionBelief, FaultBelief, Journal};
@@ -219,9 +220,15 @@ impl Replay {
                 course.tally.begun += 1;
                 self.note(t_ns, service, What::Begins);
             } else if course.standing == Standing::Following {
-                let taken = course.step.take(entry, &self.blocks, &mut self.answers);
-                if let Err(missing) = taken {
-                    self.gap(place, t_ns, missing.as_str());
+                let (blocks, answers) = (&self.blocks, &mut self.answers);
+                // A state that somebody has forged may break any promise between its parts.
+                let taken = panic::catch_unwind(AssertUnwindSafe(|| {
+                    course.step.take(entry, blocks, answers)
+                }));
+                match taken {
+                    Ok(Ok(())) => {}
+                    Ok(Err(missing)) => self.gap(place, t_ns, missing.as_str()),
+                    Err(_) => self.gap(place, t_ns, "the step has failed an assertion"),
                 }
             }
         }
