@@ -36,6 +36,8 @@ pub struct Drive {
     pub cycles: u64,
     /// Cycles before the recording begins.
     pub unrecorded: u64,
+    /// What goes wrong in a cycle.
+    pub hiccup: fn(u64) -> Hiccup,
 }
 
 /// A topic that is recorded.
@@ -128,6 +130,24 @@ impl Publisher {
         let source = SimulatorSource::new(*simulation, schedule, true, period_ns, graph);
         let cycle = SourceCycle::new(account(setup, graph, ServiceName::SensorSim), period_ns);
         Self::Rover(Box::new(cycle), Box::new(source.unwrap()))
+    }
+
+    /// Publishes a frame of another robot.
+    fn spoil(&mut self, graph: &Graph, clock: &VirtualClock, t_ns: u64) {
+        let mut frames = graph.sender::<SensorFrame>(Topic::Sensor).unwrap();
+        frames.block().robot_hash = 1;
+        let stamp = Stamp {
+            t_schedule_ns: t_ns,
+            t_capture_ns: t_ns,
+        };
+        frames.send(stamp, clock).unwrap();
+    }
+
+    /// Another start of the Kobuki's publisher.
+    fn renew(&mut self, graph: &Graph) {
+        if let Self::Kobuki(frames, ..) = self {
+            *frames = graph.sender(Topic::Sensor).unwrap();
+        }
     }
 
     fn turn(&mut self, clock: &VirtualClock, t_ns: u64) {
@@ -242,12 +262,22 @@ pub fn record(drive: &Drive, path: &Path) {
             flight = Some(file);
         }
         clock.set(k * period_ns);
-        let hiccup = hiccup(k);
-        if hiccup == Hiccup::Silent {
+        let hiccup = (drive.hiccup)(k);
+        match hiccup {
             // Later than every deadline of this period.
-            clock.advance(period_ns - 1);
-        } else {
-            publisher.turn(&clock, k * period_ns);
+            Hiccup::Silent => clock.advance(period_ns - 1),
+            Hiccup::Refused => publisher.spoil(&graph, &clock, k * period_ns),
+            Hiccup::Renewed => {
+                publisher.renew(&graph);
+                publisher.turn(&clock, k * period_ns);
+            }
+            _ => publisher.turn(&clock, k * period_ns),
+        }
+        if hiccup == Hiccup::Restarted {
+            let step = vigil_detector::assemble(&setup).unwrap();
+            detector = DetectorStage::new(step, &setup.robot, &graph).unwrap();
+            cycles[0] = stage(&setup, &graph, Detector);
+            cycles[0].account_mut().ready(&clock).unwrap();
         }
         let [first, second, third] = &mut cycles;
         if hiccup != Hiccup::DetectorLate {
@@ -275,7 +305,7 @@ fn turn(cycle: &mut StageCycle, stage: &mut impl Stage, clock: &VirtualClock) {
 
 /// What goes wrong in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Hiccup {
+pub enum Hiccup {
     Nothing,
     /// No frame comes.
     Silent,
@@ -283,13 +313,21 @@ enum Hiccup {
     DetectorLate,
     /// The identifier folds this detection and the next.
     IdentifierLate,
+    /// A frame comes that the border refuses.
+    Refused,
+    /// The publisher begins anew.
+    Renewed,
+    /// The detector is a new process.
+    Restarted,
 }
 
-const fn hiccup(k: u64) -> Hiccup {
+/// What may happen at any time.
+pub const fn now_and_then(k: u64) -> Hiccup {
     match k % 331 {
         77 | 230..=233 => Hiccup::Silent,
         120 | 121 => Hiccup::DetectorLate,
         160..=162 => Hiccup::IdentifierLate,
+        190 => Hiccup::Refused,
         _ => Hiccup::Nothing,
     }
 }

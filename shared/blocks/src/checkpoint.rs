@@ -39,7 +39,7 @@ impl Checkpoint for ParticleBlock {
     }
 
     fn load(&mut self, from: &mut CheckpointReader<'_>) {
-        self.count = from.variant(PARTICLE_CAPACITY as u32 + 1, "ParticleBlock");
+        self.count = from.variant(0, PARTICLE_CAPACITY as u32 + 1, "ParticleBlock");
         self.healthy.load(from);
         let used = self.hypotheses.iter_mut().take(self.count as usize);
         used.for_each(|hypothesis| hypothesis.load(from));

@@ -26,6 +26,8 @@ pub const JOURNAL_ENTRIES: usize = 8;
 
 /// Bytes of a state in a block.
 pub const CHECKPOINT_BYTES: usize = 16_384;
+/// Bytes of a whole state at most.
+pub const STATE_BYTES_MAX: usize = 2 << 20;
 
 /// What a [`JournalEntry`] says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr)]
@@ -41,7 +43,7 @@ pub enum JournalKind {
     Budget = 4,
     /// [`Entry::Reset`].
     Reset = 5,
-    /// A frame was refused at the border.
+    /// Frames were refused at the border; `count` of them.
     Refused = 6,
     /// A detection was seen for its blindness alone.
     Looked = 7,
@@ -53,7 +55,7 @@ part! {
 pub struct JournalEntry, size 48 {
     /// A [`JournalKind`].
     pub kind: u32,
-    /// Periods that were missed; particles that are allowed.
+    /// Periods that were missed, particles that are allowed, frames that were refused.
     pub count: u32,
     /// The input: a sensor frame; for the supervisor a diagnosis. Epoch 0 stands for none.
     pub input_epoch: u64,
@@ -147,7 +149,7 @@ impl Journal {
 
 block! {
     /// A part of a service's state, from which a replay can go on.
-    pub struct CheckpointPart, size 16472 {
+    pub struct CheckpointPart, size 16464 {
         /// Common header.
         pub header: Header,
         /// The state is that after this block of the journal: its epoch.
@@ -158,12 +160,11 @@ block! {
         pub offset: u32,
         /// Bytes of this part.
         pub size: u32,
-        /// Bytes of the whole state.
+        /// Bytes of the whole state. One of more than [`STATE_BYTES_MAX`] is not handed out: then
+        /// this is its only part, and empty.
         pub whole: u32,
         /// Reserved, zero.
         pub reserved: u32,
-        /// FNV-1a of the whole state.
-        pub hash: u64,
         /// The part.
         pub bytes: [u8; CHECKPOINT_BYTES],
     }

@@ -40,6 +40,7 @@ pub use header::{BlockId, Cause, CauseKind, Header};
 pub use health::{Degraded, EVENTS, Event, EventKind, Health, ServiceState};
 pub use journal::{
     CHECKPOINT_BYTES, CheckpointPart, Entry, JOURNAL_ENTRIES, Journal, JournalEntry, JournalKind,
+    STATE_BYTES_MAX,
 };
 pub use particles::{HealthyBelief, PARTICLE_CAPACITY, ParticleBlock, WeightedHypothesis};
 pub use rejection::{REJECTIONS, Rejection};

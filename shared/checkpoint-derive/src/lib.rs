@@ -5,7 +5,8 @@ use proc_macro2::TokenStream as Tokens;
 use quote::{format_ident, quote};
 use syn::spanned::Spanned;
 use syn::{
-    Data, DeriveInput, Error, Field, Fields, Generics, Index, Member, Path, parse_macro_input,
+    Data, DeriveInput, Error, Field, Fields, Generics, Index, Member, Path, Variant,
+    parse_macro_input,
 };
 
 /// How a field takes part.
@@ -13,7 +14,7 @@ use syn::{
 enum Part {
     /// It is saved and loaded.
     State,
-    /// It follows from the configuration, and is left as it is.
+    /// It follows from the configuration, or means nothing between two steps: it is left as it is.
     Fixed,
     /// A collection whose length follows from the configuration: each element is loaded in place.
     Each,
@@ -22,7 +23,8 @@ enum Part {
 }
 
 /// Derives `Checkpoint`: fields are saved and loaded in place, one after the other. Of an enum, the
-/// variant is to be the same. `#[checkpoint(fixed)]` leaves a field out; `#[checkpoint(each)]`
+/// variant is to be the same. `#[checkpoint(fixed)]` and `#[checkpoint(scratch)]` leave a field out;
+/// `#[checkpoint(each)]`
 /// keeps a collection's length; `#[checkpoint(with = path)]` uses `path::save` and `path::load`.
 /// `#[checkpoint(bound = "T: Bound")]` on the type adds a bound.
 #[proc_macro_derive(Checkpoint, attributes(checkpoint))]
@@ -54,10 +56,10 @@ fn part(field: &Field) -> Result<Part, Error> {
         if attribute.path().is_ident("checkpoint") {
             attribute.parse_nested_meta(|meta| {
                 part = match meta.path.get_ident().map(ToString::to_string).as_deref() {
-                    Some("fixed") => Part::Fixed,
+                    Some("fixed" | "scratch") => Part::Fixed,
                     Some("each") => Part::Each,
                     Some("with") => Part::With(meta.value()?.parse()?),
-                    _ => return Err(meta.error("allowed: fixed, each, with = path")),
+                    _ => return Err(meta.error("allowed: fixed, scratch, each, with = path")),
                 };
                 Ok(())
             })?;
@@ -93,18 +95,42 @@ fn members(fields: &Fields) -> Vec<Member> {
     fields.iter().enumerate().map(member).collect()
 }
 
-/// FNV-1a of a type's name and its fields: by it a reader knows that they are still the same.
+/// A hash of a type's name, and of the names and types of its fields: by it a reader knows that
+/// they are still the same.
 fn mark(input: &DeriveInput, fields: &Fields) -> Result<u32, Error> {
     let mut text = input.ident.to_string();
+    push_fields(&mut text, fields)?;
+    Ok(hashed(&text))
+}
+
+/// The same of an enum with its variants; there is room for the number of one in the last byte.
+fn mark_of_variants(input: &DeriveInput, variants: &[&Variant]) -> Result<u32, Error> {
+    let mut text = input.ident.to_string();
+    for variant in variants {
+        text.push_str(&format!(" {}", variant.ident));
+        push_fields(&mut text, &variant.fields)?;
+    }
+    match variants.len() {
+        1..=256 => Ok(hashed(&text) & 0xffff_ff00),
+        _ => Err(Error::new(input.span(), "allowed are 1 to 256 variants")),
+    }
+}
+
+fn push_fields(text: &mut String, fields: &Fields) -> Result<(), Error> {
     for (field, member) in fields.iter().zip(members(fields)) {
         if !matches!(part(field)?, Part::Fixed) {
-            text.push_str(&format!(" {}", quote!(#member)));
+            let of = &field.ty;
+            text.push_str(&format!(" {}: {}", quote!(#member), quote!(#of)));
         }
     }
-    let hashed = text.bytes().fold(0x811c_9dc5_u32, |hash, byte| {
+    Ok(())
+}
+
+/// FNV-1a.
+fn hashed(text: &str) -> u32 {
+    text.bytes().fold(0x811c_9dc5, |hash, byte| {
         (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
-    });
-    Ok(hashed)
+    })
 }
 
 fn save_of(part: &Part, of: &Tokens) -> Tokens {
@@ -151,7 +177,7 @@ fn in_place_struct(input: &DeriveInput, fields: &Fields) -> Result<Tokens, Error
 
 fn in_place_enum<'a>(
     input: &DeriveInput,
-    variants: impl Iterator<Item = &'a syn::Variant>,
+    variants: impl Iterator<Item = &'a Variant>,
 ) -> Result<Tokens, Error> {
     let (name, text) = (&input.ident, input.ident.to_string());
     let (mut saves, mut loads) = (Vec::new(), Vec::new());
@@ -212,11 +238,13 @@ fn value_struct(input: &DeriveInput, fields: &Fields) -> Result<Tokens, Error> {
 
 fn value_enum<'a>(
     input: &DeriveInput,
-    variants: impl Iterator<Item = &'a syn::Variant>,
+    variants: impl Iterator<Item = &'a Variant>,
 ) -> Result<Tokens, Error> {
     let (name, text) = (&input.ident, input.ident.to_string());
+    let variants: Vec<_> = variants.collect();
+    let mark = mark_of_variants(input, &variants)?;
     let (mut saves, mut reads) = (Vec::new(), Vec::new());
-    for (tag, variant) in variants.enumerate() {
+    for (tag, variant) in variants.iter().enumerate() {
         let (variant_name, tag) = (&variant.ident, tag as u32);
         let members = members(&variant.fields);
         let names: Vec<_> = (0..members.len())
@@ -224,7 +252,7 @@ fn value_enum<'a>(
             .collect();
         saves.push(quote! {
             Self::#variant_name { #(#members: #names),* } => {
-                to.mark(#tag);
+                to.mark(#mark | #tag);
                 #(vigil_checkpoint::Checkpoint::save(#names, to);)*
             }
         });
@@ -237,9 +265,8 @@ fn value_enum<'a>(
             _ => quote!(#tag => #read,),
         });
     }
-    let count = reads.len();
-    reads.rotate_left(1.min(count));
-    let count = count as u32;
+    reads.rotate_left(1);
+    let count = variants.len() as u32;
     let generics = bounded(input)?;
     let (of, types, bounds) = generics.split_for_impl();
     Ok(quote! {
@@ -254,7 +281,7 @@ fn value_enum<'a>(
         }
         impl #of vigil_checkpoint::CheckpointValue for #name #types #bounds {
             fn read(from: &mut vigil_checkpoint::CheckpointReader<'_>) -> Self {
-                match from.variant(#count, #text) { #(#reads)* }
+                match from.variant(#mark, #count, #text) { #(#reads)* }
             }
         }
     })

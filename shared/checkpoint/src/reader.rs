@@ -55,9 +55,9 @@ impl<'a> CheckpointReader<'a> {
         }
     }
 
-    /// Reads which of `count` variants follows; 0 if there is no such variant.
-    pub fn variant(&mut self, count: u32, type_name: &'static str) -> u32 {
-        let variant = u32::from_le_bytes(self.take());
+    /// Reads which of `count` variants follows, counted from `mark`; 0 if there is no such variant.
+    pub fn variant(&mut self, mark: u32, count: u32, type_name: &'static str) -> u32 {
+        let variant = u32::from_le_bytes(self.take()).wrapping_sub(mark);
         if variant >= count {
             self.fail(type_name);
             return 0;

@@ -8,8 +8,8 @@ pub trait Checkpoint {
     /// Writes the state.
     fn save(&self, to: &mut CheckpointWriter<'_>);
 
-    /// Sets the state. After a misfit, which the reader keeps, the state is any, but sound in
-    /// memory.
+    /// Sets the state. After a misfit, which the reader keeps, part of the state is set, and the
+    /// value is of no further use.
     fn load(&mut self, from: &mut CheckpointReader<'_>);
 }
 

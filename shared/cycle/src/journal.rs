@@ -1,10 +1,12 @@
 //! A service's journal: what its step took, published after each turn; and now and then its state.
 
+use std::ops::Range;
+
 use vigil_blocks::{
-    BlockId, CHECKPOINT_BYTES, CheckpointPart, JOURNAL_ENTRIES, Journal, JournalEntry, JournalKind,
-    fnv1a,
+    Block, BlockId, CHECKPOINT_BYTES, CheckpointPart, JOURNAL_ENTRIES, Journal, JournalEntry,
+    JournalKind, STATE_BYTES_MAX,
 };
-use vigil_checkpoint::{Checkpoint, CheckpointWriter};
+use vigil_checkpoint::{Checkpoint, CheckpointError, CheckpointWriter};
 
 use crate::clock::Clock;
 use crate::port::{Graph, Sender, Stamp};
@@ -16,8 +18,6 @@ use crate::topic::{ServiceName, Topic};
 pub const CHECKPOINT_PERIOD_NS: u64 = 10_000_000_000;
 /// Entries of a turn at most: more than queues hold by default.
 const ENTRIES_MAX: usize = 1024;
-/// Bytes of a state at most. Larger ones are not handed out.
-const STATE_BYTES_MAX: usize = 2 << 20;
 
 /// Publishes what a step took. Nothing here is on the way from input to output.
 pub struct JournalWriter {
@@ -28,13 +28,21 @@ pub struct JournalWriter {
     lost: u32,
     /// What was published in this turn, and after how many entries.
     answer: Option<(BlockId, usize)>,
+    /// Room for a state.
+    room: Box<[u8]>,
     /// The state that is being handed out.
-    state: Box<[u8]>,
-    /// What all its parts say.
-    head: CheckpointPart,
-    sent: usize,
+    state: Option<SavedState>,
     /// Which of the periods the last state was handed out in.
     period: Option<u64>,
+}
+
+/// A state that is being handed out.
+#[derive(Debug, Clone, Copy)]
+struct SavedState {
+    /// The journal's block after which it was so.
+    after: BlockId,
+    bytes: usize,
+    sent: usize,
 }
 
 impl JournalWriter {
@@ -51,16 +59,21 @@ impl JournalWriter {
             entries,
             lost: 0,
             answer: None,
-            state: vec![0; STATE_BYTES_MAX].into_boxed_slice(),
-            head: CheckpointPart::default(),
-            sent: 0,
+            room: vec![0; STATE_BYTES_MAX].into_boxed_slice(),
+            state: None,
             period: None,
         })
     }
 
-    /// Notes what the step has taken.
+    /// Notes what the step has taken. Refused frames that follow each other make one entry.
     pub fn note(&mut self, entry: JournalEntry) {
-        if self.entries.len() == ENTRIES_MAX {
+        let is_refused = |kind: u32| kind == JournalKind::Refused as u32;
+        let first = self.answer.map_or(0, |(_, until)| until);
+        let last = self.entries.get_mut(first..).and_then(<[_]>::last_mut);
+        let last = last.filter(|last| is_refused(last.kind) && is_refused(entry.kind));
+        if let Some(last) = last {
+            last.count = last.count.saturating_add(entry.count);
+        } else if self.entries.len() == ENTRIES_MAX {
             self.lost = self.lost.saturating_add(1);
         } else {
             self.entries.push(entry);
@@ -68,7 +81,7 @@ impl JournalWriter {
     }
 
     /// Notes what is published of what was taken so far.
-    pub fn answer<T: vigil_blocks::Block>(&mut self, sender: &dyn Sender<T>) {
+    pub fn answer<T: Block>(&mut self, sender: &dyn Sender<T>) {
         let (epoch, seq) = (sender.epoch(), sender.next_seq());
         self.answer = Some((BlockId { epoch, seq }, self.entries.len()));
     }
@@ -88,21 +101,21 @@ impl JournalWriter {
         self.send(0..until, answer, (stamp, clock))?;
         self.send(until..self.entries.len(), None, (stamp, clock))?;
         self.entries.clear();
-        let period = stamp.t_schedule_ns / CHECKPOINT_PERIOD_NS;
-        if self.sent < self.head.whole as usize {
-            self.send_part(stamp, clock)
-        } else {
-            let before = self.period.replace(period);
-            if before.is_some_and(|before| before != period) {
-                self.save(state);
-            }
-            Ok(())
+        self.journal.prepare()?;
+        if let Some(state) = self.state.take() {
+            return self.send_part(state, (stamp, clock));
         }
+        let period = stamp.t_schedule_ns / CHECKPOINT_PERIOD_NS;
+        let before = self.period.replace(period);
+        if before.is_some_and(|before| before != period) {
+            self.save(state);
+        }
+        Ok(())
     }
 
     fn send(
         &mut self,
-        entries: std::ops::Range<usize>,
+        entries: Range<usize>,
         answer: Option<BlockId>,
         (stamp, clock): (Stamp, &dyn Clock),
     ) -> Result<(), PortError> {
@@ -122,33 +135,44 @@ impl JournalWriter {
             }
             self.journal.send(stamp, clock)?;
         }
-        self.journal.prepare()
+        Ok(())
     }
 
     /// Keeps the state as it is now, to be handed out part by part.
     fn save(&mut self, state: &impl Checkpoint) {
-        let mut writer = CheckpointWriter::new(&mut self.state);
+        let mut writer = CheckpointWriter::new(&mut self.room);
         state.save(&mut writer);
-        let Ok(whole) = writer.finish() else {
-            return;
+        let bytes = match writer.finish() {
+            Ok(bytes) | Err(CheckpointError::Full { bytes, .. }) => bytes,
+            Err(_) => return,
         };
-        self.head.hash = fnv1a::hash(fnv1a::BASIS, &self.state[..whole]);
-        self.head.whole = whole as u32;
-        self.head.journal_epoch = self.journal.epoch();
-        self.head.journal_seq = self.journal.next_seq().saturating_sub(1);
-        self.sent = 0;
+        let seq = self.journal.next_seq().saturating_sub(1);
+        let epoch = self.journal.epoch();
+        self.state = Some(SavedState {
+            after: BlockId { epoch, seq },
+            bytes,
+            sent: 0,
+        });
     }
 
-    fn send_part(&mut self, stamp: Stamp, clock: &dyn Clock) -> Result<(), PortError> {
-        let rest = &self.state[self.sent..self.head.whole as usize];
+    fn send_part(
+        &mut self,
+        mut state: SavedState,
+        (stamp, clock): (Stamp, &dyn Clock),
+    ) -> Result<(), PortError> {
+        // One that is too large has a single part, which is empty and says its size.
+        let whole = self.room.get(..state.bytes).unwrap_or_default();
+        let rest = &whole[state.sent.min(whole.len())..];
         let bytes = &rest[..rest.len().min(CHECKPOINT_BYTES)];
         let part = self.parts.block();
-        part.journal_epoch = self.head.journal_epoch;
-        part.journal_seq = self.head.journal_seq;
-        (part.whole, part.hash) = (self.head.whole, self.head.hash);
-        (part.offset, part.size) = (self.sent as u32, bytes.len() as u32);
+        (part.journal_epoch, part.journal_seq) = (state.after.epoch, state.after.seq);
+        part.whole = state.bytes as u32;
+        (part.offset, part.size) = (state.sent as u32, bytes.len() as u32);
         part.bytes[..bytes.len()].copy_from_slice(bytes);
-        self.sent += bytes.len();
+        state.sent += bytes.len();
+        if state.sent < whole.len() {
+            self.state = Some(state);
+        }
         self.parts.send(stamp, clock).map(drop)
     }
 }
@@ -205,35 +229,73 @@ mod tests {
         );
     }
 
-    #[test]
-    fn the_state_goes_out_in_parts_once_a_period() {
+    /// The parts that 35 turns publish, ten in each period.
+    fn parts_of(state: &impl Checkpoint) -> Vec<CheckpointPart> {
         let (mut writer, _, graph) = journal();
-        let mut parts = graph
-            .receiver::<CheckpointPart>(Topic::Checkpoint(SERVICE))
-            .unwrap();
-        let clock = VirtualClock::default();
-        let state: Vec<u64> = (0..3000).collect();
-        let mut bytes = Vec::new();
-        for turn in 0..20 {
-            let t_ns = turn * CHECKPOINT_PERIOD_NS / 10;
-            writer.publish(&state, stamp(t_ns), &clock).unwrap();
-            while let Some(part) = parts.take_next() {
-                assert_eq!((part.offset as usize, part.journal_seq), (bytes.len(), 0));
-                assert_eq!(part.whole as usize, 4 + 8 * state.len());
-                bytes.extend_from_slice(&part.bytes[..part.size as usize]);
+        let topic = Topic::Checkpoint(SERVICE);
+        let mut received = graph.receiver::<CheckpointPart>(topic).unwrap();
+        let (clock, mut parts) = (VirtualClock::default(), Vec::new());
+        for turn in 0..35 {
+            writer.note(JournalEntry::new(JournalKind::Missed, turn));
+            let t_ns = u64::from(turn) * CHECKPOINT_PERIOD_NS / 10;
+            writer.publish(state, stamp(t_ns), &clock).unwrap();
+            while let Some(part) = received.take_next() {
+                parts.push(*part);
             }
         }
-        let mut loaded = Vec::<u64>::new();
-        let mut reader = vigil_checkpoint::CheckpointReader::new(&bytes);
-        loaded.load(&mut reader);
-        assert_eq!((reader.finish(), loaded), (Ok(()), state));
+        parts
+    }
+
+    #[test]
+    fn the_state_goes_out_in_parts_once_a_period() {
+        let state: Vec<u64> = (0..3000).collect();
+        let parts = parts_of(&state);
+        let after: Vec<u64> = parts.iter().map(|part| part.journal_seq).collect();
+        assert_eq!(after, [10, 10, 20, 20, 30, 30]);
+        for whole in parts.chunks(2) {
+            let bytes = whole
+                .iter()
+                .flat_map(|part| &part.bytes[..part.size as usize]);
+            let bytes: Vec<u8> = bytes.copied().collect();
+            assert_eq!(whole[1].offset, whole[0].size);
+            assert_eq!(whole[0].whole as usize, bytes.len());
+            let mut loaded = Vec::<u64>::new();
+            let mut reader = vigil_checkpoint::CheckpointReader::new(&bytes);
+            loaded.load(&mut reader);
+            assert_eq!((reader.finish(), &loaded), (Ok(()), &state));
+        }
+    }
+
+    #[test]
+    fn a_state_that_is_too_large_says_its_size() {
+        let state = vec![0_u64; STATE_BYTES_MAX / 8];
+        let parts = parts_of(&state);
+        let said: Vec<_> = parts.iter().map(|part| (part.offset, part.size)).collect();
+        assert_eq!(said, [(0, 0); 3]);
+        assert!(
+            parts
+                .iter()
+                .all(|part| part.whole as usize == STATE_BYTES_MAX + 4)
+        );
+    }
+
+    #[test]
+    fn refused_frames_in_a_row_are_one_entry() {
+        let (mut writer, mut received, _) = journal();
+        for _ in 0..200 {
+            writer.note(JournalEntry::new(JournalKind::Refused, 1));
+        }
+        let clock = VirtualClock::default();
+        writer.publish(&0_u64, stamp(0), &clock).unwrap();
+        let block = received.take_next().unwrap();
+        assert_eq!((block.used().len(), block.used()[1].count), (2, 200));
     }
 
     #[test]
     fn entries_without_room_are_counted() {
         let (mut writer, mut received, _) = journal();
         for _ in 0..ENTRIES_MAX + 4 {
-            writer.note(JournalEntry::new(JournalKind::Refused, 0));
+            writer.note(JournalEntry::new(JournalKind::Missed, 0));
         }
         let clock = VirtualClock::default();
         writer.publish(&0_u64, stamp(0), &clock).unwrap();

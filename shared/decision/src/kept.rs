@@ -46,7 +46,7 @@ pub(crate) mod choice {
         *choice = Choice {
             action: usize::read(from),
             margin: f64::read(from),
-            control: CONTROLS[from.variant(CONTROLS.len() as u32, "Control") as usize],
+            control: CONTROLS[from.variant(0, CONTROLS.len() as u32, "Control") as usize],
         };
     }
 }

@@ -5,7 +5,7 @@
 //! is bounded: improbable hypotheses are dropped, and when a mode's places are taken its least
 //! probable hypothesis gives way.
 
-use vigil_checkpoint::CheckpointValue;
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 
 use crate::logspace::{log_add, log_sum_exp};
 
@@ -24,13 +24,16 @@ pub struct Hypothesis<T> {
 }
 
 /// A bounded set of hypotheses.
-#[derive(Debug, Clone, CheckpointValue)]
+#[derive(Debug, Clone, Checkpoint)]
 #[checkpoint(bound = "T: CheckpointValue")]
 pub struct Bank<T> {
     hypotheses: Vec<Hypothesis<T>>,
+    #[checkpoint(scratch)]
     scratch: Vec<f64>,
+    #[checkpoint(fixed)]
     capacities: Vec<usize>,
     /// Most hypotheses in all.
+    #[checkpoint(fixed)]
     places: usize,
     limit: usize,
 }

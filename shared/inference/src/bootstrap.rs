@@ -39,12 +39,16 @@ pub struct ParticleFilter<M: Sampled> {
     rng: Pcg64Mcg,
     modes: Vec<u16>,
     states: Vec<M::State>,
+    #[checkpoint(scratch)]
     other_modes: Vec<u16>,
+    #[checkpoint(scratch)]
     other_states: Vec<M::State>,
     weights: Weights,
     /// Logarithm of the factor by which a particle's weight pays for its proposal.
     correction: Vec<f64>,
+    #[checkpoint(scratch)]
     increments: Vec<f64>,
+    #[checkpoint(scratch)]
     ancestors: Vec<u32>,
     log_p: Vec<f64>,
     posterior: Vec<f64>,

@@ -117,6 +117,9 @@ impl Findings {
             _ if !self.is_diagnosed => "The recording holds no diagnosis: it does not say whether \
                                         anything was wrong."
                 .to_owned(),
+            ([], []) if self.overall.is_none() => {
+                format!("No alarm in {duration_s:.1} s; which faults there were was not recorded.")
+            }
             ([], []) => {
                 format!("Nothing was wrong: no alarm and no fault in {duration_s:.1} s.")
             }

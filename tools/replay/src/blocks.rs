@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use vigil_blocks::{
-    Action, Block, BlockId, DetectionBelief, FaultBelief, ParticleBlock, SensorFrame,
+    Action, Block, BlockId, DetectionBelief, FaultBelief, HealthyBelief, ParticleBlock,
+    SensorFrame, WeightedHypothesis,
 };
 use vigil_cycle::Topic;
 use vigil_flight::read_block;
@@ -11,14 +12,14 @@ use vigil_flight::read_block;
 /// Blocks of one topic.
 pub(crate) struct Window<T> {
     blocks: BTreeMap<(u64, u64), Box<T>>,
-    /// In the order in which they came, each with its time, ns.
+    /// In the order in which they came, each with the time of the recording then, ns.
     order: VecDeque<(u64, (u64, u64))>,
     /// For so long a block is kept, ns.
     kept_ns: u64,
 }
 
 impl<T> Window<T> {
-    pub(crate) const fn new(kept_ns: u64) -> Self {
+    const fn new(kept_ns: u64) -> Self {
         Self {
             blocks: BTreeMap::new(),
             order: VecDeque::new(),
@@ -26,13 +27,18 @@ impl<T> Window<T> {
         }
     }
 
-    /// Adds a block; those that are too old by now go.
-    pub(crate) fn insert(&mut self, id: BlockId, t_ns: u64, block: Box<T>) {
+    /// What has come so far came at `now_ns`.
+    fn begin(&mut self, now_ns: u64) {
+        self.order.iter_mut().for_each(|(t_ns, _)| *t_ns = now_ns);
+    }
+
+    /// Adds a block that came at `now_ns`; those that are too old by then go.
+    pub(crate) fn insert(&mut self, id: BlockId, now_ns: u64, block: Box<T>) {
         let key = (id.epoch, id.seq);
         self.blocks.insert(key, block);
-        self.order.push_back((t_ns, key));
+        self.order.push_back((now_ns, key));
         while let Some((then_ns, oldest)) = self.order.front().copied()
-            && t_ns.saturating_sub(then_ns) > self.kept_ns
+            && now_ns.saturating_sub(then_ns) > self.kept_ns
         {
             self.blocks.remove(&oldest);
             self.order.pop_front();
@@ -44,44 +50,76 @@ impl<T> Window<T> {
     }
 }
 
+/// The detector's hypotheses, as few as there are.
+pub(crate) struct Hypotheses {
+    healthy: HealthyBelief,
+    used: Vec<WeightedHypothesis>,
+}
+
+impl From<&ParticleBlock> for Hypotheses {
+    fn from(block: &ParticleBlock) -> Self {
+        Self {
+            healthy: block.healthy,
+            used: block.used().to_vec(),
+        }
+    }
+}
+
+impl Hypotheses {
+    /// Writes them into a block.
+    pub(crate) fn fill(&self, block: &mut ParticleBlock) {
+        block.healthy = self.healthy;
+        block.count = self.used.len() as u32;
+        block.hypotheses[..self.used.len()].copy_from_slice(&self.used);
+    }
+}
+
 /// What steps take, and what they have answered.
 pub(crate) struct Blocks {
     pub(crate) frames: Window<SensorFrame>,
     pub(crate) detections: Window<DetectionBelief>,
     pub(crate) diagnoses: Window<FaultBelief>,
     pub(crate) actions: Window<Action>,
-    /// The detector's hypotheses, computed again.
-    pub(crate) particles: Window<ParticleBlock>,
+    /// Computed again.
+    pub(crate) hypotheses: Window<Hypotheses>,
 }
 
 impl Blocks {
-    /// Recorded blocks are kept for `kept_ns`, computed hypotheses for `particles_ns`.
-    pub(crate) const fn new(kept_ns: u64, particles_ns: u64) -> Self {
+    /// Each block is kept for `kept_ns`.
+    pub(crate) const fn new(kept_ns: u64) -> Self {
         Self {
             frames: Window::new(kept_ns),
             detections: Window::new(kept_ns),
             diagnoses: Window::new(kept_ns),
             actions: Window::new(kept_ns),
-            particles: Window::new(particles_ns),
+            hypotheses: Window::new(kept_ns),
         }
     }
 
+    /// The time of the recording is known from now on.
+    pub(crate) fn begin(&mut self, now_ns: u64) {
+        self.frames.begin(now_ns);
+        self.detections.begin(now_ns);
+        self.diagnoses.begin(now_ns);
+        self.actions.begin(now_ns);
+    }
+
     /// Keeps a recorded block, if a step may need it; false if it cannot be read.
-    pub(crate) fn take(&mut self, topic: Topic, t_ns: u64, bytes: &[u8]) -> bool {
+    pub(crate) fn take(&mut self, topic: Topic, now_ns: u64, bytes: &[u8]) -> bool {
         match topic {
-            Topic::Sensor => insert(&mut self.frames, t_ns, bytes),
-            Topic::Detection => insert(&mut self.detections, t_ns, bytes),
-            Topic::Diagnosis => insert(&mut self.diagnoses, t_ns, bytes),
-            Topic::Action => insert(&mut self.actions, t_ns, bytes),
+            Topic::Sensor => insert(&mut self.frames, now_ns, bytes),
+            Topic::Detection => insert(&mut self.detections, now_ns, bytes),
+            Topic::Diagnosis => insert(&mut self.diagnoses, now_ns, bytes),
+            Topic::Action => insert(&mut self.actions, now_ns, bytes),
             _ => true,
         }
     }
 }
 
-fn insert<T: Block>(window: &mut Window<T>, t_ns: u64, bytes: &[u8]) -> bool {
+fn insert<T: Block>(window: &mut Window<T>, now_ns: u64, bytes: &[u8]) -> bool {
     let block = read_block::<T>(bytes);
     if let Some(block) = &block {
-        window.insert(block.header().id(), t_ns, Box::new(*block));
+        window.insert(block.header().id(), now_ns, Box::new(*block));
     }
     block.is_some()
 }

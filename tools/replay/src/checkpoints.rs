@@ -1,6 +1,6 @@
 //! States of one service, from the parts in which they were handed out.
 
-use vigil_blocks::{BlockId, CheckpointPart, fnv1a};
+use vigil_blocks::{BlockId, CheckpointPart, STATE_BYTES_MAX};
 
 /// A whole state.
 pub(crate) struct WholeState {
@@ -13,8 +13,10 @@ pub(crate) struct WholeState {
 #[derive(Default)]
 pub(crate) struct Checkpoints {
     whole: Vec<WholeState>,
-    /// The one under way, and its hash.
-    partial: Option<(WholeState, u64)>,
+    /// The one under way.
+    partial: Option<WholeState>,
+    /// Bytes of the last one that was too large to be handed out.
+    too_large: Option<u32>,
 }
 
 /// States that wait to be used, at most.
@@ -23,35 +25,38 @@ const WHOLE_MAX: usize = 4;
 impl Checkpoints {
     /// Takes the next part. Parts that do not follow each other make no state.
     pub(crate) fn take(&mut self, part: &CheckpointPart) {
-        if part.offset == 0 {
-            let after = BlockId {
-                epoch: part.journal_epoch,
-                seq: part.journal_seq,
-            };
-            let bytes = Vec::new();
-            self.partial = Some((WholeState { after, bytes }, part.hash));
-        }
-        let Some((state, hash)) = &mut self.partial else {
+        if part.whole as usize > STATE_BYTES_MAX {
+            self.too_large = Some(part.whole);
             return;
+        }
+        let after = BlockId {
+            epoch: part.journal_epoch,
+            seq: part.journal_seq,
         };
-        let follows = state.after.seq == part.journal_seq
-            && state.after.epoch == part.journal_epoch
-            && state.bytes.len() == part.offset as usize;
-        let Some(bytes) = part.bytes.get(..part.size as usize).filter(|_| follows) else {
-            self.partial = None;
+        if part.offset == 0 {
+            let bytes = Vec::new();
+            self.partial = Some(WholeState { after, bytes });
+        }
+        let follows =
+            |state: &WholeState| state.after == after && state.bytes.len() == part.offset as usize;
+        let state = self.partial.take().filter(follows);
+        let (Some(mut state), Some(bytes)) = (state, part.bytes.get(..part.size as usize)) else {
             return;
         };
         state.bytes.extend_from_slice(bytes);
         if state.bytes.len() < part.whole as usize {
+            self.partial = Some(state);
             return;
         }
-        let is_sound = fnv1a::hash(fnv1a::BASIS, &state.bytes) == *hash;
-        if let Some((state, _)) = self.partial.take().filter(|_| is_sound) {
-            if self.whole.len() == WHOLE_MAX {
-                self.whole.remove(0);
-            }
-            self.whole.push(state);
+        if self.whole.len() == WHOLE_MAX {
+            self.whole.remove(0);
         }
+        self.whole.push(state);
+    }
+
+    /// Bytes of a state that was too large to be handed out, since the last call.
+    pub(crate) const fn take_too_large(&mut self) -> Option<u32> {
+        self.too_large.take()
     }
 
     /// The state after a block of the journal; it and older ones go.
@@ -73,7 +78,6 @@ mod tests {
                 offset: 3 * place as u32,
                 size: chunk.len() as u32,
                 whole: bytes.len() as u32,
-                hash: fnv1a::hash(fnv1a::BASIS, bytes),
                 ..CheckpointPart::default()
             };
             part.bytes[..chunk.len()].copy_from_slice(chunk);
@@ -100,14 +104,11 @@ mod tests {
     }
 
     #[test]
-    fn a_state_with_a_part_lost_or_broken_is_none() {
+    fn a_state_with_a_part_lost_or_of_another_size_is_none() {
         let mut states = Checkpoints::default();
         let mut broken = parts(b"12345678", 5);
         states.take(&broken[0]);
         states.take(&broken[2]);
-        assert!(states.after(id(5)).is_none());
-        broken[1].bytes[0] ^= 1;
-        broken.iter().for_each(|part| states.take(part));
         assert!(states.after(id(5)).is_none());
         broken[1].size = u32::MAX;
         broken.iter().for_each(|part| states.take(part));

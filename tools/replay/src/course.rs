@@ -26,6 +26,8 @@ pub struct Tally {
     pub answers: u64,
     /// Those that were computed again, and whose block was recorded.
     pub compared: u64,
+    /// Those that were computed again, and whose block was not recorded.
+    pub unrecorded: u64,
     /// Of these, the ones that are not the same to the last bit.
     pub different: u64,
     /// States that were compared with what was handed out.
@@ -54,6 +56,8 @@ pub(crate) struct Course {
     /// Blocks of the journal that are to come, each with its time, ns.
     pub(crate) journal: VecDeque<(u64, Journal)>,
     pub(crate) tally: Tally,
+    /// The last answer that the journal tells of.
+    pub(crate) answered: Option<BlockId>,
     /// The last block of the journal, and the entries that were lost by then.
     last: Option<(BlockId, u32)>,
 }
@@ -67,6 +71,7 @@ impl Course {
             checkpoints: Checkpoints::default(),
             journal: VecDeque::new(),
             tally: Tally::default(),
+            answered: None,
             last: None,
         }
     }
@@ -82,7 +87,9 @@ impl Course {
         match last {
             None => None,
             Some((last, _)) if last.epoch != id.epoch => Some("a start was not recorded"),
-            Some((last, _)) if last.seq + 1 != id.seq => Some("the journal was not recorded"),
+            Some((last, _)) if last.seq.checked_add(1) != Some(id.seq) => {
+                Some("the journal was not recorded")
+            }
             Some((_, lost)) if lost != block.lost => Some("the journal had no room"),
             Some(_) => None,
         }

@@ -4,26 +4,31 @@ use std::collections::VecDeque;
 use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
 
-use vigil_blocks::{Action, Block, BlockId, CheckpointPart, DetectionBelief, FaultBelief, Journal};
+use vigil_blocks::layout::Layout;
+use vigil_blocks::{
+    Action, Block, BlockId, CheckpointPart, DetectionBelief, FaultBelief, Journal, JournalEntry,
+    STATE_BYTES_MAX,
+};
 use vigil_cycle::Topic;
 use vigil_cycle::topic::ServiceName;
 use vigil_flight::{FlightReader, Recorded, read_block};
 use vigil_setup::{Document, Setup};
 
-use crate::blocks::{Blocks, Window};
+use crate::blocks::{Blocks, Hypotheses, Window};
 use crate::course::{Course, Gap, Standing, Tally, begins};
 use crate::difference::{Difference, first_difference};
 use crate::error::ReplayError;
 use crate::step::{Answers, Step};
 
-/// What lies so far ahead in the file is read before a step is computed, ns: recordings hold
-/// topics one after the other, and states in parts.
+/// The file is read so far ahead of what is computed, ns: it holds topics one after the other, and
+/// states in parts.
 const AHEAD_NS: u64 = 10_000_000_000;
-/// Who takes the detector's answers is computed so much later, ns: their journals may be published
-/// first.
-const BEHIND_NS: u64 = 200_000_000;
-/// Bytes of a state at most.
-const STATE_BYTES_MAX: usize = 16 << 20;
+
+/// A state that somebody has forged may break any promise between its parts.
+const ASSERTION_FAILED: &str = "the step has failed an assertion";
+/// Places in [`ServiceName::STEPPING`].
+const DETECTOR: usize = 0;
+const IDENTIFIER: usize = 1;
 
 /// What was computed.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,8 +73,11 @@ pub struct Replay {
     blocks: Blocks,
     answers: Answers,
     moments: VecDeque<Moment>,
-    /// Up to here the file is read, ns; without end at its end.
+    /// Up to here the file is read, ns: by the journals, whose times nobody outside has written. 0
+    /// before the first of them.
     read_ns: u64,
+    /// True at its end.
+    is_read: bool,
     /// Blocks that could not be read.
     foreign_count: u64,
     /// Room for a state.
@@ -91,10 +99,11 @@ impl Replay {
         Ok(Self {
             file,
             courses: [course(first)?, course(second)?, course(third)?],
-            blocks: Blocks::new(2 * AHEAD_NS, 5 * BEHIND_NS),
+            blocks: Blocks::new(3 * AHEAD_NS),
             answers: Answers::default(),
             moments: VecDeque::new(),
             read_ns: 0,
+            is_read: false,
             foreign_count: 0,
             state: vec![0; STATE_BYTES_MAX].into_boxed_slice(),
             setup,
@@ -137,7 +146,7 @@ impl Replay {
             }
             if let Some(place) = self.due() {
                 self.turn(place)?;
-            } else if self.read_ns == u64::MAX {
+            } else if self.is_read {
                 return Ok(None);
             } else {
                 self.read()?;
@@ -148,7 +157,7 @@ impl Replay {
     /// Reads on in the file.
     fn read(&mut self) -> Result<(), ReplayError> {
         let Some(recorded) = self.file.next()? else {
-            self.read_ns = u64::MAX;
+            self.is_read = true;
             return Ok(());
         };
         let Recorded::Block {
@@ -159,13 +168,18 @@ impl Replay {
         else {
             return Ok(());
         };
-        self.read_ns = self.read_ns.max(log_time_ns);
         let course = |service: ServiceName| move |course: &&mut Course| course.service == service;
         match topic {
             Topic::Journal(service) => {
                 let found = self.courses.iter_mut().find(course(service));
                 match found.zip(read_block::<Journal>(bytes)) {
-                    Some((course, block)) => course.journal.push_back((log_time_ns, block)),
+                    Some((course, block)) => {
+                        course.journal.push_back((log_time_ns, block));
+                        if self.read_ns == 0 {
+                            self.blocks.begin(log_time_ns);
+                        }
+                        self.read_ns = self.read_ns.max(log_time_ns);
+                    }
                     None => self.foreign_count += 1,
                 }
             }
@@ -177,29 +191,41 @@ impl Replay {
                 }
             }
             _ => {
-                let is_ours = self.blocks.take(topic, log_time_ns, bytes);
+                let is_ours = self.blocks.take(topic, self.read_ns, bytes);
                 self.foreign_count += u64::from(!is_ours);
             }
         }
         Ok(())
     }
 
-    /// Whose journal goes on: the oldest block of all, if enough of the file is read.
+    /// Whose journal goes on, if enough of the file is read: the oldest block of all; but the
+    /// detector's, as long as it has not answered what the oldest one takes.
     fn due(&self) -> Option<usize> {
-        let heads = self
-            .courses
-            .iter()
-            .enumerate()
-            .filter_map(|(place, course)| {
-                let (t_ns, _) = course.journal.front()?;
-                let behind_ns = match place {
-                    0 => 0,
-                    _ => BEHIND_NS,
-                };
-                Some((t_ns + behind_ns, place))
-            });
-        let (t_ns, place) = heads.min()?;
-        (t_ns.saturating_add(AHEAD_NS) <= self.read_ns).then_some(place)
+        let fronts = self.courses.iter().map(|course| course.journal.front());
+        let heads = fronts.enumerate().filter_map(|(place, front)| {
+            let (t_ns, block) = front?;
+            Some((*t_ns, place, block))
+        });
+        let (_, oldest, block) = heads.min_by_key(|(t_ns, place, _)| (*t_ns, *place))?;
+        let place = match oldest == IDENTIFIER && self.waits(block) {
+            true => DETECTOR,
+            false => oldest,
+        };
+        let (t_ns, _) = self.courses[place].journal.front()?;
+        let is_read = self.is_read || t_ns.saturating_add(AHEAD_NS) <= self.read_ns;
+        is_read.then_some(place)
+    }
+
+    /// True if the identifier takes a detection that the detector has yet to answer.
+    fn waits(&self, block: &Journal) -> bool {
+        let detector = &self.courses[DETECTOR];
+        // A writer that starts later has the larger epoch.
+        let key = |id: BlockId| (id.epoch, id.seq);
+        let answered = detector.answered.map(key);
+        let mut taken = block.used().iter().filter_map(JournalEntry::detection);
+        self.courses[IDENTIFIER].standing == Standing::Following
+            && !detector.journal.is_empty()
+            && taken.any(|id| Some(key(id)) > answered)
     }
 
     /// Computes one block of a journal.
@@ -221,14 +247,13 @@ impl Replay {
                 self.note(t_ns, service, What::Begins);
             } else if course.standing == Standing::Following {
                 let (blocks, answers) = (&self.blocks, &mut self.answers);
-                // A state that somebody has forged may break any promise between its parts.
                 let taken = panic::catch_unwind(AssertUnwindSafe(|| {
                     course.step.take(entry, blocks, answers)
                 }));
                 match taken {
                     Ok(Ok(())) => {}
                     Ok(Err(missing)) => self.gap(place, t_ns, missing.as_str()),
-                    Err(_) => self.gap(place, t_ns, "the step has failed an assertion"),
+                    Err(_) => self.gap(place, t_ns, ASSERTION_FAILED),
                 }
             }
         }
@@ -271,19 +296,21 @@ impl Replay {
     fn answer(&mut self, place: usize, t_ns: u64, id: BlockId) {
         let course = &mut self.courses[place];
         course.tally.answers += 1;
+        course.answered = Some(id);
         if course.standing == Standing::Waiting {
             return;
         }
         let (blocks, answers) = (&mut self.blocks, &mut self.answers);
         let (answer, compared) = match place {
-            0 => {
-                let particles = answers.particles.clone();
-                blocks.particles.insert(id, t_ns, particles);
+            DETECTOR => {
+                let hypotheses = Hypotheses::from(&*answers.particles);
+                let hypotheses = Box::new(hypotheses);
+                blocks.hypotheses.insert(id, self.read_ns, hypotheses);
                 let answer = std::mem::take(&mut answers.detection);
                 let compared = compared(&blocks.detections, id, &*answer);
                 (Answer::Detection(answer), compared)
             }
-            1 => {
+            IDENTIFIER => {
                 let answer = std::mem::take(&mut answers.diagnosis);
                 let compared = compared(&blocks.diagnoses, id, &*answer);
                 (Answer::Diagnosis(answer), compared)
@@ -296,6 +323,7 @@ impl Replay {
         };
         let service = course.service;
         course.tally.compared += u64::from(compared.is_some());
+        course.tally.unrecorded += u64::from(compared.is_none());
         let difference = compared
             .flatten()
             .map(|[field, recorded, computed]| Difference {
@@ -314,9 +342,16 @@ impl Replay {
     /// with it.
     fn compare_state(&mut self, place: usize, t_ns: u64, id: BlockId) {
         // Its first input is what the detector answers from then on.
-        let can_begin = place != 1 || self.courses[0].standing == Standing::Following;
+        let detector = self.courses[DETECTOR].standing;
+        let can_begin = place != IDENTIFIER || detector == Standing::Following;
         let course = &mut self.courses[place];
         let service = course.service;
+        if let Some(bytes) = course.checkpoints.take_too_large()
+            && course.standing == Standing::Waiting
+        {
+            let what = format!("a state of {bytes} bytes is too large to be handed out");
+            return self.tell_gap(place, t_ns, &what);
+        }
         let Some(recorded) = course.checkpoints.after(id) else {
             return;
         };
@@ -329,32 +364,48 @@ impl Replay {
             if computed == Some(recorded.bytes.as_slice()) {
                 return;
             }
-            let size = |bytes: usize| format!("{bytes} bytes");
+            let (field, recorded, computed) =
+                difference_of_states(&recorded.bytes, computed.unwrap_or_default());
             let difference = Difference {
                 service,
                 t_ns,
                 block: id,
-                field: "state".to_owned(),
-                recorded: size(recorded.bytes.len()),
-                computed: size(computed.map_or(0, <[u8]>::len)),
+                field,
+                recorded,
+                computed,
             };
             course.tally.different += 1;
             self.note(t_ns, service, What::StateDiffers(difference));
         }
         let course = &mut self.courses[place];
-        match course.step.load(&recorded.bytes) {
-            Ok(()) => {
+        course.standing = Standing::Waiting;
+        match panic::catch_unwind(AssertUnwindSafe(|| course.step.load(&recorded.bytes))) {
+            Ok(Ok(())) => {
                 course.standing = Standing::Following;
                 course.tally.begun += 1;
                 self.note(t_ns, service, What::Begins);
             }
-            Err(error) => self.tell_gap(place, t_ns, &error.to_string()),
+            Ok(Err(error)) => self.tell_gap(place, t_ns, &error.to_string()),
+            Err(_) => self.tell_gap(place, t_ns, ASSERTION_FAILED),
         }
     }
 }
 
+/// Where two states of a step differ first, and the eight bytes there.
+fn difference_of_states(recorded: &[u8], computed: &[u8]) -> (String, String, String) {
+    let same = recorded.iter().zip(computed).take_while(|(a, b)| a == b);
+    let at = same.count();
+    let words = |bytes: &[u8]| {
+        let rest = bytes.get(at..).unwrap_or_default().iter().take(8);
+        let hex: String = rest.map(|byte| format!("{byte:02x}")).collect();
+        format!("{hex} ({} bytes)", bytes.len())
+    };
+    let field = format!("state, from byte {at} on");
+    (field, words(recorded), words(computed))
+}
+
 /// What differs, if anything does; `None` if the block was not recorded.
-fn compared<T: Block + vigil_blocks::layout::Layout>(
+fn compared<T: Block + Layout>(
     recorded: &Window<T>,
     id: BlockId,
     computed: &T,

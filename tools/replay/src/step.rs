@@ -19,6 +19,8 @@ pub(crate) struct Answers {
     pub(crate) detection: Box<DetectionBelief>,
     pub(crate) particles: Box<ParticleBlock>,
     pub(crate) diagnosis: Box<FaultBelief>,
+    /// The detector's, on their way to the identifier.
+    detected: Box<ParticleBlock>,
     hypotheses: Box<ParticleBlock>,
     pub(crate) action: Box<Action>,
 }
@@ -30,6 +32,7 @@ pub(crate) enum Missing {
     Detection,
     Hypotheses,
     Diagnosis,
+    Version,
 }
 
 impl Missing {
@@ -39,6 +42,7 @@ impl Missing {
             Self::Detection => "a detection was not recorded",
             Self::Hypotheses => "the detector's hypotheses are not known",
             Self::Diagnosis => "a diagnosis was not recorded",
+            Self::Version => "the journal is of another version",
         }
     }
 }
@@ -80,9 +84,7 @@ impl Step {
         blocks: &Blocks,
         to: &mut Answers,
     ) -> Result<(), Missing> {
-        let Some(kind) = JournalKind::from_repr(entry.kind) else {
-            return Ok(());
-        };
+        let kind = JournalKind::from_repr(entry.kind).ok_or(Missing::Version)?;
         match self {
             Self::Detector(detector) => detect(detector, kind, entry, (blocks, to)),
             Self::Identifier(identifier) => identify(identifier, kind, entry, (blocks, to)),
@@ -149,8 +151,9 @@ fn identify(
             let frame = entry.input().and_then(|id| blocks.frames.get(id));
             let detected = match entry.detection() {
                 Some(id) => {
-                    let particles = blocks.particles.get(id).ok_or(Missing::Hypotheses)?;
-                    Some((detection(id)?, particles))
+                    let hypotheses = blocks.hypotheses.get(id).ok_or(Missing::Hypotheses)?;
+                    hypotheses.fill(&mut to.detected);
+                    Some((detection(id)?, &*to.detected))
                 }
                 None => None,
             };

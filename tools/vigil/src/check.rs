@@ -7,8 +7,8 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::{
-    Action, Control, DetectionBelief, FaultBelief, Faults, Health, ParticleBlock, SensorFrame,
-    Truth,
+    Action, CheckpointPart, Control, DetectionBelief, FaultBelief, Faults, Health, Journal,
+    ParticleBlock, SensorFrame, Truth,
 };
 use vigil_cycle::Topic;
 use vigil_cycle::domain::shared_memory_free_bytes;
@@ -221,6 +221,7 @@ fn shared_memory(setup: &Setup) -> Finding {
         size_of::<FaultBelief>(),
         size_of::<Action>() + size_of::<Faults>(),
         ServiceName::ALL.len() * (size_of::<Health>() + size_of::<Control>()),
+        ServiceName::STEPPING.len() * (size_of::<Journal>() + size_of::<CheckpointPart>()),
     ];
     let others = sizes.iter().map(|&size| queues.reserved_bytes(size));
     let need = frames + others.sum::<u64>();

@@ -14,7 +14,8 @@ pub(crate) struct Publisher {
     pace: Pace,
     epoch: u64,
     run_id: u64,
-    /// Findings that were not taken yet: of the pace, of the meaning.
+    /// Findings that were not taken yet: of the pace, of the meaning. Nothing follows from them.
+    #[checkpoint(scratch)]
     found: [Option<Finding>; 2],
 }
 

@@ -6,8 +6,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 use vigil_blocks::{
-    Action, DetectionBelief, FaultBelief, Faults, Health, ParticleBlock, SensorFrame, Truth,
+    Action, DetectionBelief, FaultBelief, Faults, Health, Journal, ParticleBlock, SensorFrame,
+    Truth,
 };
+
+/// States of the services' steps, bytes a second: as measured of the rover.
+const STATES_BYTES_S: usize = 34_000;
 
 /// The black box: how much it keeps, and when it writes a recording.
 #[derive(Debug, Clone, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
@@ -20,7 +24,7 @@ pub struct Blackbox {
     /// that can be written, else the user's own, `~/.local/state/vigil`.
     pub folder: String,
     /// Memory for the last seconds; what does not fit is dropped, the oldest first. A rover at 100
-    /// Hz fills one MiB a second.
+    /// Hz fills 1.1 MiB a second.
     #[default(80)]
     #[schemars(range(min = 4, max = 8192))]
     pub memory_mib: u32,
@@ -71,10 +75,12 @@ impl Blackbox {
             + size_of::<DetectionBelief>()
             + size_of::<FaultBelief>()
             + size_of::<Action>()
-            + size_of::<Truth>();
+            + size_of::<Truth>()
+            + 3 * size_of::<Journal>();
         let each_second = 2 * size_of::<ParticleBlock>()
             + 10 * size_of::<Faults>()
-            + 4 * 20 * size_of::<Health>();
+            + 4 * 20 * size_of::<Health>()
+            + STATES_BYTES_S;
         self.memory_bytes() as f64 / (each_cycle as f64 * rate_hz + each_second as f64)
     }
 

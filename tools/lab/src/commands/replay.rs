@@ -14,7 +14,7 @@ use vigil_timeline::unix_time_of_day;
 
 /// Differences and gaps that are listed at most; all are counted.
 const LISTED_MAX: usize = 20;
-/// Longest time that is waited for, s: gaps of a recording need not be sat through.
+/// Longest time that is waited for, s: gaps of a recording are cut out.
 const WAIT_S_MAX: f64 = 10.0;
 
 /// Computes again what a recorded graph believed and did, and compares it bit by bit.
@@ -55,12 +55,14 @@ struct Document {
     schema_version: u32,
     recording: String,
     graph: String,
-    /// True if something was compared, and nothing differs.
+    /// True if answers of each service were compared, and nothing differs.
     identical: bool,
     /// Time of the recording that was computed, s; and how many times as fast as it was.
     recorded_s: f64,
     speed: f64,
     is_cut: bool,
+    /// Why the rest of the file cannot be read.
+    damaged: Option<String>,
     foreign_blocks: u64,
     services: Vec<ComparedService>,
     differences: Vec<ListedDifference>,
@@ -73,6 +75,7 @@ struct ComparedService {
     answers: u64,
     compared: u64,
     different: u64,
+    unrecorded: u64,
     states: u64,
     begun: u64,
     gaps: u64,
@@ -126,10 +129,14 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         differences: Vec::new(),
         gaps: Vec::new(),
     };
-    while let Some(moment) = replay.next_moment().map_err(CommandError::failure)? {
-        teller.take(replay.setup(), moment)?;
-    }
-    let document = teller.document(&replay);
+    let damaged = loop {
+        match replay.next_moment() {
+            Ok(Some(moment)) => teller.take(replay.setup(), moment)?,
+            Ok(None) => break None,
+            Err(error) => break Some(error.to_string()),
+        }
+    };
+    let document = teller.document(&replay, damaged);
     let is_identical = document.identical;
     let printed = match args.json {
         true => output::json(&document),
@@ -187,11 +194,14 @@ impl Teller<'_> {
         Ok(())
     }
 
-    /// Waits until so much time has passed since it began.
-    fn wait_until(&self, due_s: f64) {
+    /// Waits until so much time has passed since it began; what would take longer is cut out.
+    fn wait_until(&mut self, due_s: f64) {
         let ahead_s = due_s - self.began.elapsed().as_secs_f64();
+        let cut_s = (ahead_s - WAIT_S_MAX).max(0.0);
+        let cut_out = self.began.checked_sub(Duration::from_secs_f64(cut_s));
+        self.began = cut_out.unwrap_or(self.began);
         if ahead_s > 0.0 {
-            thread::sleep(Duration::from_secs_f64(ahead_s.min(WAIT_S_MAX)));
+            thread::sleep(Duration::from_secs_f64(ahead_s - cut_s));
         }
     }
 
@@ -239,7 +249,7 @@ impl Teller<'_> {
         }
     }
 
-    fn document(self, replay: &Replay) -> Document {
+    fn document(mut self, replay: &Replay, damaged: Option<String>) -> Document {
         let services = ServiceName::STEPPING.map(|service| {
             let tally: Tally = replay.tally(service);
             ComparedService {
@@ -247,6 +257,7 @@ impl Teller<'_> {
                 answers: tally.answers,
                 compared: tally.compared,
                 different: tally.different,
+                unrecorded: tally.unrecorded,
                 states: tally.states,
                 begun: tally.begun,
                 gaps: tally.gaps,
@@ -255,6 +266,7 @@ impl Teller<'_> {
         let first_ns = self.first_ns.unwrap_or(self.last_ns);
         let recorded_s = (self.last_ns - first_ns) as f64 * 1e-9;
         let unix_s = |t_ns: u64| t_ns as f64 * 1e-9;
+        self.differences.sort_by_key(|it| it.t_ns);
         let differences = self.differences.into_iter().map(|it| ListedDifference {
             service: it.service.as_str(),
             t_unix_s: unix_s(it.t_ns),
@@ -268,15 +280,18 @@ impl Teller<'_> {
             t_unix_s: unix_s(it.t_ns),
             what: it.what,
         });
-        let compared: u64 = services.iter().map(|it| it.compared).sum();
+        let is_compared = |it: &ComparedService| it.compared > 0 || it.answers == 0;
+        let answers: u64 = services.iter().map(|it| it.answers).sum();
+        let is_whole = damaged.is_none() && answers > 0 && services.iter().all(is_compared);
         Document {
             schema_version: 1,
             recording: self.args.recording.display().to_string(),
             graph: replay.setup().file.graph.name.clone(),
-            identical: compared > 0 && services.iter().all(|it| it.different == 0),
+            identical: is_whole && services.iter().all(|it| it.different == 0),
             recorded_s,
             speed: recorded_s / self.began.elapsed().as_secs_f64().max(1e-9),
             is_cut: replay.is_cut(),
+            damaged,
             foreign_blocks: replay.foreign_count(),
             services: services.into(),
             differences: differences.collect(),
@@ -291,15 +306,21 @@ fn summary(document: &Document) -> String {
         "{:.1} s of graph {}, computed at {:.0} times their pace\n\n",
         document.recorded_s, document.graph, document.speed
     );
-    let heads = ["answers", "compared", "different", "states", "gaps"];
+    let heads = [
+        "answers",
+        "compared",
+        "different",
+        "unrecorded",
+        "states",
+        "gaps",
+    ];
     text += &format!("{:<12}", "service");
-    heads.iter().for_each(|head| text += &format!("{head:>10}"));
+    heads.iter().for_each(|head| text += &format!("{head:>11}"));
     for it in &document.services {
         text += &format!("\n{:<12}", it.service);
-        let figures = [it.answers, it.compared, it.different, it.states, it.gaps];
-        figures
-            .iter()
-            .for_each(|figure| text += &format!("{figure:>10}"));
+        let compared = [it.answers, it.compared, it.different, it.unrecorded];
+        let figures = compared.into_iter().chain([it.states, it.gaps]);
+        figures.for_each(|figure| text += &format!("{figure:>11}"));
     }
     for it in document.differences.iter().take(1) {
         text += &format!(
@@ -320,11 +341,27 @@ fn summary(document: &Document) -> String {
     if document.is_cut {
         text += "\nthe recording was cut short";
     }
-    let compared: u64 = document.services.iter().map(|it| it.compared).sum();
-    text += match (document.identical, compared) {
-        (true, _) => "\n\nidentical to the last bit",
-        (false, 0) => "\n\nnothing could be compared: the recording holds no start and no state",
-        (false, _) => "\n\nNOT identical",
-    };
-    text
+    if let Some(damaged) = &document.damaged {
+        text += &format!("\nthe rest cannot be read: {damaged}");
+    }
+    text + "\n\n" + &verdict(document)
+}
+
+fn verdict(document: &Document) -> String {
+    let sum = |of: fn(&ComparedService) -> u64| document.services.iter().map(of).sum::<u64>();
+    let left = sum(|it| it.answers) - sum(|it| it.compared);
+    let alone = document
+        .services
+        .iter()
+        .find(|it| it.compared == 0 && it.answers > 0);
+    match alone {
+        _ if sum(|it| it.different) > 0 => "NOT identical".to_owned(),
+        Some(it) => format!(
+            "nothing of the {} could be compared: no start, no state",
+            it.service
+        ),
+        None if sum(|it| it.answers) == 0 => "there is no journal: nothing was compared".to_owned(),
+        None if left > 0 => format!("identical to the last bit, but for {left} not compared"),
+        None => "identical to the last bit".to_owned(),
+    }
 }
