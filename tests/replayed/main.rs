@@ -208,10 +208,9 @@ fn demand_same_from_a_state(name: &str, drive: &Drive) {
     let replayed = recorded(drive);
     assert_eq!(replayed.first_difference, None, "{name}");
     assert_eq!(replayed.gaps, Vec::<String>::new(), "{name}");
-    assert_eq!(
-        replayed.had_a_fault, [true; 3],
-        "{name}: something to compute"
-    );
+    // Not every filter finds a name.
+    let [alarm, _, action] = replayed.had_a_fault;
+    assert!(alarm && action, "{name}: something to compute");
     for tally in replayed.tallies {
         let is_there = tally.compared > 1000 && tally.states > 0 && tally.begun == 1;
         assert!(is_there, "{name}: {tally:?}");
