@@ -220,39 +220,73 @@ fn document(drive: &Drive) -> Document {
     document
 }
 
+/// The services that step, each with its cycle.
+struct Stages {
+    cycles: [StageCycle; 3],
+    detector: DetectorStage,
+    identifier: IdentifierStage,
+    supervisor: SupervisorStage,
+}
+
+impl Stages {
+    fn new(setup: &Setup, graph: &Graph, clock: &VirtualClock) -> Self {
+        let step = vigil_identifier::assemble(setup).unwrap();
+        let identifier = IdentifierStage::new(step, &setup.robot, graph).unwrap();
+        let step = vigil_supervisor::assemble(setup).unwrap();
+        let life = vigil_supervisor::fault_life(setup).unwrap();
+        let board = FaultBoard::new(life, setup.tree.hash(), graph, None).unwrap();
+        let validity_ns = vigil_supervisor::validity_ns(setup);
+        let mut cycles = ServiceName::STEPPING.map(|name| stage(setup, graph, name));
+        for cycle in &mut cycles {
+            cycle.account_mut().ready(clock).unwrap();
+        }
+        Self {
+            cycles,
+            detector: detector(setup, graph),
+            identifier,
+            supervisor: SupervisorStage::new(step, board, graph, validity_ns).unwrap(),
+        }
+    }
+
+    /// The detector is a new process.
+    fn restart_detector(&mut self, setup: &Setup, graph: &Graph, clock: &VirtualClock) {
+        self.detector = detector(setup, graph);
+        self.cycles[0] = stage(setup, graph, ServiceName::Detector);
+        self.cycles[0].account_mut().ready(clock).unwrap();
+    }
+
+    fn turn(&mut self, k: u64, hiccup: Hiccup, clock: &VirtualClock) {
+        let [first, second, third] = &mut self.cycles;
+        if hiccup != Hiccup::DetectorLate {
+            turn(first, &mut self.detector, clock);
+        }
+        if hiccup != Hiccup::IdentifierLate {
+            turn(second, &mut self.identifier, clock);
+        }
+        if k % 997 == 5 {
+            // As a cycle near its limit does.
+            self.identifier.limit(20 + (k % 100) as u32);
+        }
+        turn(third, &mut self.supervisor, clock);
+    }
+}
+
+fn detector(setup: &Setup, graph: &Graph) -> DetectorStage {
+    let step = vigil_detector::assemble(setup).unwrap();
+    DetectorStage::new(step, &setup.robot, graph).unwrap()
+}
+
 /// Runs the graph, and writes what it publishes.
 pub fn record(drive: &Drive, path: &Path) {
-    use ServiceName::{Detector, Identifier, Supervisor};
-    let document = document(drive);
-    let text = document.to_text().unwrap();
-    let setup = Document::from_text(path, text.clone())
-        .unwrap()
-        .check()
-        .unwrap();
+    let text = document(drive).to_text().unwrap();
+    let setup = Document::from_text(path, text.clone()).unwrap();
+    let setup = setup.check().unwrap();
     let (period_ns, clock) = (setup.period_ns(), VirtualClock::default());
     let graph = Graph::InProcess(Bus::new(clock.clone()));
     let mut feeds = Feeds::new(&graph);
     let mut publisher = Publisher::new(&setup, &graph, drive.inject);
-    let mut detector = {
-        let step = vigil_detector::assemble(&setup).unwrap();
-        DetectorStage::new(step, &setup.robot, &graph).unwrap()
-    };
-    let mut identifier = {
-        let step = vigil_identifier::assemble(&setup).unwrap();
-        IdentifierStage::new(step, &setup.robot, &graph).unwrap()
-    };
-    let mut supervisor = {
-        let step = vigil_supervisor::assemble(&setup).unwrap();
-        let life = vigil_supervisor::fault_life(&setup).unwrap();
-        let board = FaultBoard::new(life, setup.tree.hash(), &graph, None).unwrap();
-        let validity_ns = vigil_supervisor::validity_ns(&setup);
-        SupervisorStage::new(step, board, &graph, validity_ns).unwrap()
-    };
-    let mut cycles = [Detector, Identifier, Supervisor].map(|name| stage(&setup, &graph, name));
     clock.set(period_ns);
-    for cycle in &mut cycles {
-        cycle.account_mut().ready(&clock).unwrap();
-    }
+    let mut stages = Stages::new(&setup, &graph, &clock);
     let mut flight = None;
     for k in 1..=drive.cycles {
         if k > drive.unrecorded && flight.is_none() {
@@ -261,36 +295,21 @@ pub fn record(drive: &Drive, path: &Path) {
                 .unwrap();
             flight = Some(file);
         }
-        clock.set(k * period_ns);
+        let t_ns = k * period_ns;
+        clock.set(t_ns);
         let hiccup = (drive.hiccup)(k);
         match hiccup {
             // Later than every deadline of this period.
             Hiccup::Silent => clock.advance(period_ns - 1),
-            Hiccup::Refused => publisher.spoil(&graph, &clock, k * period_ns),
-            Hiccup::Renewed => {
-                publisher.renew(&graph);
-                publisher.turn(&clock, k * period_ns);
-            }
-            _ => publisher.turn(&clock, k * period_ns),
+            Hiccup::Refused => publisher.spoil(&graph, &clock, t_ns),
+            Hiccup::Renewed => publisher.renew(&graph),
+            Hiccup::Restarted => stages.restart_detector(&setup, &graph, &clock),
+            _ => {}
         }
-        if hiccup == Hiccup::Restarted {
-            let step = vigil_detector::assemble(&setup).unwrap();
-            detector = DetectorStage::new(step, &setup.robot, &graph).unwrap();
-            cycles[0] = stage(&setup, &graph, Detector);
-            cycles[0].account_mut().ready(&clock).unwrap();
+        if !matches!(hiccup, Hiccup::Silent | Hiccup::Refused) {
+            publisher.turn(&clock, t_ns);
         }
-        let [first, second, third] = &mut cycles;
-        if hiccup != Hiccup::DetectorLate {
-            turn(first, &mut detector, &clock);
-        }
-        if hiccup != Hiccup::IdentifierLate {
-            turn(second, &mut identifier, &clock);
-        }
-        if k % 997 == 5 {
-            // As a cycle near its limit does.
-            identifier.limit(20 + (k % 100) as u32);
-        }
-        turn(third, &mut supervisor, &clock);
+        stages.turn(k, hiccup, &clock);
         if k % 4 == 0 {
             feeds.drain(&mut flight);
         }

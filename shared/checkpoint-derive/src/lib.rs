@@ -23,9 +23,10 @@ enum Part {
 }
 
 /// Derives `Checkpoint`: fields are saved and loaded in place, one after the other. Of an enum, the
-/// variant is to be the same. `#[checkpoint(fixed)]` and `#[checkpoint(scratch)]` leave a field out;
-/// `#[checkpoint(each)]`
-/// keeps a collection's length; `#[checkpoint(with = path)]` uses `path::save` and `path::load`.
+/// variant is to be the same.
+///
+/// `#[checkpoint(fixed)]` and `#[checkpoint(scratch)]` leave a field out. `#[checkpoint(each)]`
+/// keeps a collection's length. `#[checkpoint(with = path)]` uses `path::save` and `path::load`.
 /// `#[checkpoint(bound = "T: Bound")]` on the type adds a bound.
 #[proc_macro_derive(Checkpoint, attributes(checkpoint))]
 pub fn derive_checkpoint(input: TokenStream) -> TokenStream {
