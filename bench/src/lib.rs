@@ -8,6 +8,7 @@ use toml::Table;
 use vigil_setup::{Setup, SetupError, load_graph};
 
 pub mod archive;
+pub mod blackbox;
 pub mod chain;
 pub mod corridors;
 pub mod field;

@@ -31,6 +31,8 @@ struct Program {
 enum Question {
     /// Are verdicts and actions the same, bit for bit, as those of `bench/bits.txt`?
     Bits(bits::Args),
+    /// What does the black box cost the services: when it runs, is stopped, or is killed?
+    Blackbox(blackbox::Args),
     /// What are the decisions worth in corridors? Random missions: Vigil, and the best ladder.
     Corridors(corridors::Args),
     /// Does the diagnosis hold in the field: for hours, over gaps, on other grounds, with other
@@ -85,6 +87,7 @@ impl Question {
     fn answer(&self) -> Result<(), Box<dyn Error>> {
         match self {
             Self::Bits(args) => bits::run(args),
+            Self::Blackbox(args) => blackbox::run(args),
             Self::Corridors(args) => corridors::run(args),
             Self::Field(args) => field::run(args),
             Self::FirstMinute => first_minute::run(),

@@ -1,6 +1,7 @@
 //! The questions, and what the options of several of them share.
 
 pub mod bits;
+pub mod blackbox;
 pub mod corridors;
 pub mod field;
 pub mod first_minute;

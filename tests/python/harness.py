@@ -38,11 +38,11 @@ def publisher(name, *arguments):
 class Graph:
     """A graph of its own name on the default configuration; stopped at the end of a `with`."""
 
-    def __init__(self, *options, name=None, recordings=None):
+    def __init__(self, *options, name=None, recordings=None, before_s=3.0):
         self.name = name or f"py{os.getpid()}-{uuid.uuid4().hex[:6]}"
         self.options = options
         # Folder of the black box, if it is to run.
-        self.recordings = recordings
+        self.recordings, self.before_s = recordings, before_s
         # A port of its own: another graph may be taking datagrams on this machine.
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
             free.bind(("127.0.0.1", 0))
@@ -55,7 +55,8 @@ class Graph:
         with open(config / "rover.toml", "a") as file:
             file.write(f'\n[sensor.socket]\nudp = "127.0.0.1:{self.udp_port}"\n')
             if self.recordings:
-                file.write(f'[blackbox]\nfolder = "{self.recordings}"\nbefore_s = 3.0\nafter_s = 1.0\n')
+                times = f"before_s = {self.before_s}\nafter_s = 1.0\n"
+                file.write(f'[blackbox]\nfolder = "{self.recordings}"\n{times}')
         command = [BINARIES / "vigil-launcher", "--json", "--config", config / "rover.toml"]
         command += [] if self.recordings else ["--no-blackbox"]
         command += ["--graph", self.name, *self.options]

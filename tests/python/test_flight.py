@@ -4,11 +4,12 @@ import json
 import os
 import pathlib
 import signal
+import subprocess
 import tempfile
 import time
 import unittest
 
-from harness import WATCHDOG_S, Graph, events, vigil
+from harness import BINARIES, WATCHDOG_S, Graph, events, vigil
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -55,6 +56,13 @@ def wait_for(look, what):
             return found
         time.sleep(0.05)
     raise TimeoutError(what)
+
+
+def replayed(path):
+    """What `vigil replay` says of a recording, and of each of its services."""
+    said = vigil("replay", path, "--verify", "--json")
+    document = json.loads(said.stdout)
+    return document, {of["service"]: of for of in document["services"]}
 
 
 class BlackBox(unittest.TestCase):
@@ -164,6 +172,86 @@ class BlackBox(unittest.TestCase):
         self.assertIn("detector", flight.about["vigil"]["what"])
         writers = {message.data[8:16] for message in flight.raw["/vigil/raw/detection"]}
         self.assertEqual(len(writers), 2, "both processes of the detector")
+        # The second begins anew, so that all of its answers can be computed again.
+        document, services = replayed(path)
+        self.assertTrue(document["identical"], document)
+        self.assertGreater(services["detector"]["compared"], 0, document)
+
+    def test_a_recording_of_any_length_is_computed_again_to_the_last_bit(self):
+        path = self.folder / "drive.mcap"
+        with Graph("--inject", "stuck:RM@14", "--duration", "60", recordings=self.folder, before_s=30.0) as graph:
+            graph.wait_until_up()
+            wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            said = vigil("record", path, "--graph", graph.name, "--duration", "25")
+            self.assertEqual(said.returncode, 0, said)
+            # So much of it, but for a pause of the machine.
+            self.assertRegex(said.stdout, rf"^{path}: 2[45]\.")
+            again = vigil("record", path, "--graph", graph.name)
+            self.assertEqual((again.returncode, "--force" in again.stderr), (2, True), again)
+            kept, *_ = wait_for(lambda: self.recordings("alarm"), "a recording")
+            graph.stop()
+        flight = Flight(path)
+        self.assertEqual(flight.about["vigil"]["reason"], "record")
+        told = [message.msg for _, message in flight.messages["/vigil/events"]]
+        self.assertTrue(any("alarm" in text for text in told), told)
+        # The graph's own black box was not disturbed.
+        for recording in [path, kept]:
+            document, services = replayed(recording)
+            self.assertTrue(document["identical"], document)
+            for service in ["detector", "identifier", "supervisor"]:
+                self.assertGreater(services[service]["compared"], 0, document)
+
+    def test_a_full_disk_is_said_and_the_black_box_writes_again_when_there_is_room(self):
+        mount = ["mount", "-t", "tmpfs", "-o", "size=3m", "vigil-test", self.folder]
+        if subprocess.run(mount, stderr=subprocess.DEVNULL).returncode != 0:
+            self.skipTest("mounting a small disk needs root")
+        self.addCleanup(subprocess.run, ["umount", self.folder], check=True)
+        with Graph("--duration", "60", recordings=self.folder) as graph:
+            graph.wait_until_up()
+            wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            first = wait_for(lambda: self.blackbox(graph), "a black box")
+            time.sleep(3)
+            vigil("snapshot", "too much", "--graph", graph.name)
+            cut, *_ = wait_for(lambda: self.recordings("request-cut"), "what there was room for")
+            subprocess.run(["mount", "-o", "remount,size=64m", self.folder], check=True)
+            vigil("snapshot", "enough", "--graph", graph.name)
+            path, *_ = wait_for(lambda: self.recordings("request"), "a recording")
+            self.assertEqual(self.blackbox(graph), first, "it was not restarted")
+            graph.launcher.terminate()
+            _, told = graph.launcher.communicate(timeout=WATCHDOG_S)
+        self.assertEqual(told.count("no recording"), 1, told)
+        self.assertIn("No space left on device", told)
+        self.assertEqual(Flight(path).about["vigil"]["what"], "enough")
+        self.assertTrue(replayed(cut)[0]["is_cut"])
+
+    def test_a_recording_ends_with_a_signal_or_its_graph(self):
+        path = self.folder / "drive.mcap"
+        with Graph("--duration", "60") as graph:
+            graph.wait_until_up()
+            wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+
+            def record(*options):
+                command = [BINARIES / "vigil", "record", path, "--graph", graph.name, *options]
+                recorder = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                wait_for(lambda: part.exists() and part.stat().st_size > 2e6, "its content")
+                return recorder
+
+            part = pathlib.Path(f"{path}.part")
+            killed = record()
+            killed.kill()
+            killed.communicate()
+            self.assertTrue(replayed(part)[0]["is_cut"])
+            part.unlink()
+            recorder = record()
+            recorder.send_signal(signal.SIGINT)
+            said, _ = recorder.communicate(timeout=WATCHDOG_S)
+            self.assertEqual((recorder.returncode, part.exists()), (0, False), said)
+            recorder = record("--force")
+            graph.stop()
+            _, said = recorder.communicate(timeout=WATCHDOG_S)
+            self.assertEqual((recorder.returncode, part.exists()), (0, False), said)
+            self.assertIn("the graph has ended", said)
+        self.assertGreater(len(Flight(path).raw["/vigil/raw/sensor"]), 50)
 
 
 if __name__ == "__main__":

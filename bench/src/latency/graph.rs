@@ -71,6 +71,10 @@ impl GraphFile {
             set(&mut file, "identifier", "filter", "hierarchical".into())?;
         }
         find_models(&mut file)?;
+        let recordings = folder.join("recordings").display().to_string();
+        let mut blackbox = Table::new();
+        blackbox.insert("folder".into(), recordings.into());
+        file.insert("blackbox".into(), blackbox.into());
         if !change.is_fifo {
             for service in STAGE_NAMES {
                 let services = file.get_mut("services").and_then(|s| s.get_mut(service));
@@ -165,6 +169,23 @@ impl GraphFile {
     /// # Errors
     /// If the graph fails or leaves no stamps.
     pub fn run(&self, seconds: f64, folder: &Path) -> Result<GraphRun, Box<dyn Error>> {
+        let mut command = self.command(seconds, folder);
+        command.args(["--duration", &seconds.to_string()]);
+        if self.is_faulty {
+            command.args(["--inject", FAULT]);
+        }
+        let output = command.output()?;
+        if !output.status.success() {
+            let text = String::from_utf8_lossy(&output.stderr);
+            return Err(format!("the graph ended with {}\n{text}", output.status).into());
+        }
+        GraphRun::read(&output.stdout, folder)
+    }
+
+    /// Its launcher, to be started: without a black box, and with room for the stamps of `seconds`.
+    /// What it prints at the end is for [`GraphRun::read`].
+    #[must_use]
+    pub fn command(&self, seconds: f64, folder: &Path) -> Command {
         let rate_hz = self.setup.file.graph.rate_hz;
         let kept = ((seconds + START_S) * rate_hz).ceil();
         let mut command = Command::new(&self.launcher);
@@ -175,21 +196,19 @@ impl GraphFile {
             .arg(folder);
         command.args(["--stamped-cycles", &kept.to_string()]);
         // What the black box costs is a measurement of its own.
-        command.args([
-            "--json",
-            "--no-blackbox",
-            "--duration",
-            &seconds.to_string(),
-        ]);
-        if self.is_faulty {
-            command.args(["--inject", FAULT]);
-        }
-        let output = command.stdin(Stdio::null()).output()?;
-        if !output.status.success() {
-            let text = String::from_utf8_lossy(&output.stderr);
-            return Err(format!("the graph ended with {}\n{text}", output.status).into());
-        }
-        let summary: Value = serde_json::from_slice(&output.stdout)?;
+        command.args(["--json", "--no-blackbox"]);
+        command.stdin(Stdio::null());
+        command
+    }
+}
+
+impl GraphRun {
+    /// From what the launcher has printed, and from the stamps in `folder`, which are gone then.
+    ///
+    /// # Errors
+    /// If there are none.
+    pub fn read(printed: &[u8], folder: &Path) -> Result<Self, Box<dyn Error>> {
+        let summary: Value = serde_json::from_slice(printed)?;
         let read = |stage: usize| {
             if summary["services"].get(STAGE_NAMES[stage]).is_none() {
                 return Ok(Vec::new());
@@ -200,7 +219,7 @@ impl GraphFile {
             found
         };
         let stamps = [read(0)?, read(1)?, read(2)?, read(3)?];
-        Ok(GraphRun { summary, stamps })
+        Ok(Self { summary, stamps })
     }
 }
 

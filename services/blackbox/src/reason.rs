@@ -20,6 +20,8 @@ pub enum Reason {
     SafeStop,
     /// A service missed cycles.
     Miss,
+    /// Somebody records into a file of his own.
+    Record,
 }
 
 impl Reason {
@@ -51,6 +53,7 @@ impl Reason {
             Self::Alarm => "alarm",
             Self::SafeStop => "safe-stop",
             Self::Miss => "miss",
+            Self::Record => "record",
         }
     }
 }

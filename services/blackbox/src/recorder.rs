@@ -1,8 +1,9 @@
 //! Writes a recording: what the ring holds of the time before, and what follows.
 
 use std::collections::BTreeMap;
+use std::error::Error;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
@@ -11,7 +12,7 @@ use std::time::Duration;
 use vigil_cycle::{Clock, Monotonic, Topic};
 use vigil_flight::{FlightError, FlightWriter};
 use vigil_setup::RunningGraph;
-use vigil_timeline::{EventReader, WallClock};
+use vigil_timeline::{EventReader, TimelineEntry, WallClock};
 
 use crate::folder::{self, RecordingsFolder};
 use crate::reason::Reason;
@@ -95,7 +96,7 @@ impl Orders {
 #[derive(Debug)]
 pub struct Recording {
     orders: Arc<Orders>,
-    thread: JoinHandle<Result<PathBuf, RecordingError>>,
+    thread: JoinHandle<Result<Written, RecordingError>>,
 }
 
 /// What a recording is written from, and where to.
@@ -103,11 +104,37 @@ pub struct Material {
     /// What the graph runs on.
     pub running: RunningGraph,
     /// Text of that, for an exact replay.
-    pub document: String,
+    document: String,
     /// Where recordings lie.
-    pub folder: RecordingsFolder,
+    destination: Destination,
     /// Blocks that came and were overwritten before they were taken, so far.
     pub lost: AtomicU64,
+}
+
+/// Where recordings lie.
+#[derive(Debug, Clone)]
+pub enum Destination {
+    /// In a folder of bounded size, each with a name of its own.
+    Folder(RecordingsFolder),
+    /// In this file; what lies there is replaced.
+    File(PathBuf),
+}
+
+/// A recording that was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Written {
+    /// Where.
+    pub path: PathBuf,
+    /// Its size.
+    pub bytes: u64,
+    /// Time that its blocks cover.
+    pub covered: Duration,
+    /// Blocks in it.
+    pub blocks: u64,
+    /// Blocks that were overwritten before they were taken.
+    pub lost: u64,
+    /// Times at which blocks were overwritten in the ring before they were written.
+    pub gaps: u64,
 }
 
 impl Recording {
@@ -126,10 +153,10 @@ impl Recording {
         let write = move || {
             // What it will take at least, so that the bound holds while it is written.
             let memory_bytes = material.running.setup.file.blackbox.memory_bytes();
-            material.folder.prune(memory_bytes);
+            material.destination.prune(memory_bytes);
             let written = write(&material, ring, &order, &shared);
             shared.causes().is_closed = true;
-            material.folder.prune(0);
+            material.destination.prune(0);
             written
         };
         Self {
@@ -160,7 +187,7 @@ impl Recording {
     ///
     /// # Errors
     /// Why it could not be written.
-    pub fn finish(self) -> Result<PathBuf, RecordingError> {
+    pub fn finish(self) -> Result<Written, RecordingError> {
         self.orders.ends.store(true, Ordering::Relaxed);
         self.thread.join().unwrap_or(Err(RecordingError::Thread))
     }
@@ -172,37 +199,68 @@ fn write(
     ring: RingReader,
     order: &Order,
     orders: &Orders,
-) -> Result<PathBuf, RecordingError> {
+) -> Result<Written, RecordingError> {
     // The calendar may have been set since the graph began.
     let clock = WallClock::now();
-    let path = material.name(&order.cause, &clock);
+    let destination = &material.destination;
+    let path = destination.name(&order.cause, &clock);
     let file = FlightWriter::create(&path, &material.running.setup, clock)?;
     let filling = Filling {
         file,
         ring,
         pending: None,
+        events: EventReader::open(&material.running.domain.events_file()),
+        pending_event: None,
+        blocks: 0,
+        bounds_ns: None,
         order,
         orders,
     };
     match filling.fill(material, &clock) {
-        Ok(gravest) => {
-            let named = material.name(&gravest, &clock);
-            Ok(match std::fs::rename(&path, &named) {
-                Ok(()) => named,
-                Err(_) => path,
-            })
+        Ok((gravest, mut written)) => {
+            let named = destination.name(&gravest, &clock);
+            if std::fs::rename(&written.path, &named).is_ok() {
+                written.path = named;
+            }
+            Ok(written)
         }
         Err(error) => {
-            folder::adopt(&folder::part_of(&path));
+            if let Destination::Folder(_) = destination {
+                folder::adopt(&folder::part_of(&path));
+            }
             Err(error)
         }
     }
 }
 
-impl Material {
+impl Destination {
     fn name(&self, cause: &Cause, clock: &WallClock) -> PathBuf {
-        let time = clock.rfc3339(cause.t_ns);
-        self.folder.name(&time, cause.reason.word())
+        match self {
+            Self::Folder(folder) => folder.name(&clock.rfc3339(cause.t_ns), cause.reason.word()),
+            Self::File(path) => path.clone(),
+        }
+    }
+
+    /// Makes room for `more` bytes; a file of somebody's own has no bound.
+    fn prune(&self, more: u64) {
+        if let Self::Folder(folder) = self {
+            folder.prune(more);
+        }
+    }
+}
+
+impl Material {
+    /// Of a running graph.
+    ///
+    /// # Errors
+    /// Its configuration has no form as text.
+    pub fn new(running: RunningGraph, destination: Destination) -> Result<Self, Box<dyn Error>> {
+        Ok(Self {
+            document: running.document.to_text()?,
+            destination,
+            lost: AtomicU64::new(0),
+            running,
+        })
     }
 
     /// What is said of a recording beside its messages.
@@ -236,13 +294,24 @@ struct Filling<'a> {
     ring: RingReader,
     /// What lies beyond the present end: it belongs to the recording if that is put off.
     pending: Option<Record>,
+    events: EventReader,
+    /// An event beyond the present end.
+    pending_event: Option<TimelineEntry>,
+    /// Blocks so far.
+    blocks: u64,
+    /// When the first and the last of them came, ns.
+    bounds_ns: Option<[u64; 2]>,
     order: &'a Order,
     orders: &'a Orders,
 }
 
 impl Filling<'_> {
-    /// Writes all of it; the gravest of its causes.
-    fn fill(mut self, material: &Material, clock: &WallClock) -> Result<Cause, RecordingError> {
+    /// Writes all of it; the gravest of its causes, and what was written.
+    fn fill(
+        mut self,
+        material: &Material,
+        clock: &WallClock,
+    ) -> Result<(Cause, Written), RecordingError> {
         let document = material.document.as_bytes();
         self.file
             .attach("document.toml", "application/toml", document)?;
@@ -251,23 +320,31 @@ impl Filling<'_> {
         let about = material.about(cause, std::slice::from_ref(cause), clock);
         self.file.metadata("vigil", &about)?;
         let lost_before = material.lost.load(Ordering::Relaxed);
-        self.blocks()?;
-        self.events(&material.running.domain.events_file())?;
+        self.fill_until_end()?;
         let mut causes = self.orders.causes().all.clone();
         causes.sort();
         let gravest = causes.first().unwrap_or(&self.order.cause).clone();
         let mut about = material.about(&gravest, &causes, clock);
         let lost = material.lost.load(Ordering::Relaxed);
-        let lost = lost.saturating_sub(lost_before);
+        let (lost, gaps) = (lost.saturating_sub(lost_before), self.ring.overtaken());
         about.insert("lost".to_owned(), lost.to_string());
-        about.insert("gaps".to_owned(), self.ring.overtaken().to_string());
+        about.insert("gaps".to_owned(), gaps.to_string());
         self.file.metadata("vigil", &about)?;
-        self.file.finish()?;
-        Ok(gravest)
+        let finished = self.file.finish()?;
+        let [first_ns, last_ns] = self.bounds_ns.unwrap_or_default();
+        let written = Written {
+            path: finished.path,
+            bytes: finished.bytes,
+            covered: Duration::from_nanos(last_ns.saturating_sub(first_ns)),
+            blocks: self.blocks,
+            lost,
+            gaps,
+        };
+        Ok((gravest, written))
     }
 
-    /// Writes every block until the end, which may be put off meanwhile.
-    fn blocks(&mut self) -> Result<(), RecordingError> {
+    /// Writes every block and event until the end, which may be put off meanwhile.
+    fn fill_until_end(&mut self) -> Result<(), RecordingError> {
         loop {
             let next = match self.pending.take() {
                 Some(record) => Some(record),
@@ -279,11 +356,16 @@ impl Filling<'_> {
                     let topic = Topic::ALL.get(usize::from(record.code));
                     if let (Some(topic), true) = (topic, record.t_ns >= self.order.from_ns) {
                         self.file.block(*topic, &record.bytes)?;
+                        self.blocks += 1;
+                        let [first_ns, _] = self.bounds_ns.unwrap_or([record.t_ns; 2]);
+                        self.bounds_ns = Some([first_ns, record.t_ns]);
                     }
                 }
                 next => {
                     self.pending = next;
-                    if self.is_over() {
+                    let is_over = self.is_over();
+                    self.events(is_over)?;
+                    if is_over {
                         return Ok(());
                     }
                     thread::sleep(POLL);
@@ -295,20 +377,29 @@ impl Filling<'_> {
     /// True, and then no cause is taken any more, if all of the recording's time has passed.
     fn is_over(&self) -> bool {
         let mut causes = self.orders.causes();
-        let is_past = Monotonic.now_ns() > causes.until_ns + EVENTS_LATE_NS;
+        let is_past = Monotonic.now_ns() > causes.until_ns.saturating_add(EVENTS_LATE_NS);
         causes.is_closed = is_past || self.orders.ends.load(Ordering::Relaxed);
         causes.is_closed
     }
 
-    /// Writes the events of the same time.
-    fn events(&mut self, path: &Path) -> Result<(), RecordingError> {
+    /// Writes the events that have come since; one beyond the present end waits for what becomes
+    /// of that.
+    fn events(&mut self, is_over: bool) -> Result<(), RecordingError> {
         let until_ns = self.orders.causes().until_ns;
-        let mut events = EventReader::open(path);
-        while let Some(entry) = events.next_entry().map_err(RecordingError::Events)? {
+        loop {
+            let entry = match self.pending_event.take() {
+                Some(entry) => entry,
+                None => match self.events.next_entry().map_err(RecordingError::Events)? {
+                    Some(entry) => entry,
+                    None => return Ok(()),
+                },
+            };
             if (self.order.from_ns..=until_ns).contains(&entry.t_ns) {
                 self.file.event(&entry)?;
+            } else if entry.t_ns > until_ns && !is_over {
+                self.pending_event = Some(entry);
+                return Ok(());
             }
         }
-        Ok(())
     }
 }

@@ -2,9 +2,10 @@
 
 use std::error::Error;
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::Duration;
 
@@ -16,7 +17,7 @@ use vigil_setup::{RunningGraph, Setup};
 use crate::feeds::{Feeds, News};
 use crate::folder::RecordingsFolder;
 use crate::reason::Reason;
-use crate::recorder::{Cause, Material, Order, Recording};
+use crate::recorder::{Cause, Destination, Material, Order, Recording};
 use crate::ring::{RingReader, RingWriter};
 
 /// Longest pause between two looks: what is lost when this process is killed.
@@ -29,20 +30,15 @@ const AFTER_MAX: u64 = 6;
 /// Keeps and writes until it is asked to stop, or no service is left.
 pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     signal::install();
-    let material = Arc::new(material(running)?);
+    let folder = folder(&running)?;
+    let path = folder.path().as_os_str().as_encoded_bytes();
+    fs::write(running.domain.recordings_file(), path)?;
+    let material = Arc::new(Material::new(running, Destination::Folder(folder))?);
     let domain = &material.running.domain;
-    fs::write(
-        domain.recordings_file(),
-        material.folder.path().as_os_str().as_encoded_bytes(),
-    )?;
-    let left = set_aside(&domain.ring_file());
-    let rescue = left.as_deref().and_then(|left| rescue(&material, left));
-    let kept = keep(&material);
+    let mut rescue = set_aside(&domain.ring_file()).and_then(|left| Rescue::start(&material, left));
+    let kept = keep(&material, &mut rescue);
     // Whatever happened: what was left is written before this process ends.
-    rescue.into_iter().for_each(tell);
-    if let Some(left) = left {
-        let _ = fs::remove_file(left);
-    }
+    rescue.into_iter().for_each(Rescue::finish);
     kept?;
     // An orderly end: nothing is left to be rescued.
     let _ = fs::remove_file(domain.ring_file());
@@ -51,28 +47,29 @@ pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
 
 /// Writes what a black box has kept that was killed with its graph, and nothing else.
 pub fn rescue_only(running: RunningGraph) -> Result<(), Box<dyn Error>> {
-    let material = Arc::new(material(running)?);
-    let ring = material.running.domain.ring_file();
-    rescue(&material, &ring).into_iter().for_each(tell);
-    let _ = fs::remove_file(ring);
+    let folder = folder(&running)?;
+    let material = Arc::new(Material::new(running, Destination::Folder(folder))?);
+    let rescue = Rescue::start(&material, material.running.domain.ring_file());
+    rescue.into_iter().for_each(Rescue::finish);
     Ok(())
 }
 
-fn material(running: RunningGraph) -> Result<Material, Box<dyn Error>> {
+/// Where its recordings lie; keeps off the cores of the services.
+fn folder(running: &RunningGraph) -> io::Result<RecordingsFolder> {
     let setup = &running.setup;
-    placement::keep_off(&ServiceName::ALL.map(|name| setup.service(name).core));
+    keep_off(setup);
     let (settings, graph) = (&setup.file.blackbox, running.domain.graph());
     let candidates = settings.folders(&setup.path, graph);
     let folder = RecordingsFolder::open(&candidates, graph, settings.folder_bytes())?;
     for cut in folder.adopt_parts() {
         say(&format!("{} was cut short", cut.display()));
     }
-    Ok(Material {
-        document: running.document.to_text()?,
-        folder,
-        lost: AtomicU64::new(0),
-        running,
-    })
+    Ok(folder)
+}
+
+/// Keeps this process off the cores of the services.
+pub fn keep_off(setup: &Setup) {
+    placement::keep_off(&ServiceName::ALL.map(|name| setup.service(name).core));
 }
 
 /// Puts the ring of an earlier process aside; `None` if there is none.
@@ -81,25 +78,43 @@ fn set_aside(ring: &Path) -> Option<PathBuf> {
     fs::rename(ring, &left).ok().map(|()| left)
 }
 
-/// Writes what an earlier process has kept.
-fn rescue(material: &Arc<Material>, path: &Path) -> Option<Recording> {
-    let ring = RingReader::open(path).ok()?;
-    let now_ns = Monotonic.now_ns();
-    let order = Order {
-        cause: Cause {
-            reason: Reason::Crash,
-            t_ns: now_ns,
-            text: "the black box before this one was killed".to_owned(),
-        },
-        from_ns: 0,
-        until_ns: now_ns,
-        until_ns_max: now_ns,
-    };
-    Some(Recording::start(material, ring, order))
+/// What an earlier process has kept, while it is being written.
+struct Rescue {
+    recording: Recording,
+    left: PathBuf,
+}
+
+impl Rescue {
+    /// Begins to write it; what is no ring is removed.
+    fn start(material: &Arc<Material>, left: PathBuf) -> Option<Self> {
+        let Ok(ring) = RingReader::open(&left) else {
+            let _ = fs::remove_file(left);
+            return None;
+        };
+        let now_ns = Monotonic.now_ns();
+        let order = Order {
+            cause: Cause {
+                reason: Reason::Crash,
+                t_ns: now_ns,
+                text: "the black box before this one was killed".to_owned(),
+            },
+            from_ns: 0,
+            until_ns: now_ns,
+            until_ns_max: now_ns,
+        };
+        let recording = Recording::start(material, ring, order);
+        Some(Self { recording, left })
+    }
+
+    /// Waits until it is written, and gives its memory back.
+    fn finish(self) {
+        tell(self.recording);
+        let _ = fs::remove_file(self.left);
+    }
 }
 
 /// Keeps the last seconds, and writes them when there is a reason.
-fn keep(material: &Arc<Material>) -> Result<(), Box<dyn Error>> {
+fn keep(material: &Arc<Material>, rescue: &mut Option<Rescue>) -> Result<(), Box<dyn Error>> {
     let (domain, setup) = (&material.running.domain, &material.running.setup);
     let settings = &setup.file.blackbox;
     let ring = RingWriter::create(&domain.ring_file(), settings.memory_bytes())?;
@@ -122,13 +137,15 @@ fn keep(material: &Arc<Material>) -> Result<(), Box<dyn Error>> {
             thread::sleep(pause);
         }
         blackbox.look(&mut feeds)?;
+        let is_over = |rescue: &mut Rescue| rescue.recording.is_over();
+        rescue.take_if(is_over).into_iter().for_each(Rescue::finish);
     }
     blackbox.recordings.into_iter().for_each(tell);
     Ok(())
 }
 
 /// Between two looks: half the time in which the shortest queue fills.
-fn pause(setup: &Setup) -> Duration {
+pub fn pause(setup: &Setup) -> Duration {
     let period = Duration::from_secs_f64(1.0 / setup.file.graph.rate_hz);
     let buffer = u32::try_from(setup.file.transport.buffer).unwrap_or(2);
     (period * buffer / 2).min(POLL_MAX)
@@ -226,7 +243,7 @@ fn reason(news: &News) -> Option<(Reason, String)> {
 /// Waits until a recording is finished, and says where it lies.
 fn tell(recording: Recording) {
     match recording.finish() {
-        Ok(path) => say(&format!("recorded {}", path.display())),
+        Ok(written) => say(&format!("recorded {}", written.path.display())),
         Err(error) => say(&format!("no recording: {error}")),
     }
 }

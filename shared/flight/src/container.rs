@@ -110,9 +110,11 @@ impl Container {
     }
 
     fn container_error(&self, source: McapError) -> FlightError {
-        FlightError::Container {
-            path: self.part_path.clone(),
-            source,
+        let path = self.part_path.clone();
+        match source {
+            // The container's own text says nothing of what the system said.
+            McapError::Io(source) => FlightError::File { path, source },
+            source => FlightError::Container { path, source },
         }
     }
 

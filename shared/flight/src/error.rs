@@ -7,7 +7,7 @@ use thiserror::Error;
 /// Why a flight cannot be written or read. What was flushed before stays in the partial file.
 #[derive(Debug, Error)]
 pub enum FlightError {
-    /// The file cannot be created, synchronised or renamed.
+    /// The file cannot be created, written, synchronised or renamed.
     #[error("cannot write {}: {source}", path.display())]
     File {
         /// The file.
@@ -15,7 +15,7 @@ pub enum FlightError {
         /// What the system says.
         source: std::io::Error,
     },
-    /// The container refuses a record, or the disk does.
+    /// The container refuses a record.
     #[error("cannot write {}: {source}", path.display())]
     Container {
         /// The file.

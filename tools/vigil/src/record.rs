@@ -1,4 +1,7 @@
-//! `vigil record`: the frames of a publisher as a file, to learn from or to play back.
+//! `vigil record`: the frames of a publisher as a file, to learn from or to play back; or all that
+//! a running graph publishes.
+
+mod flight;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -24,24 +27,49 @@ const PAUSE_PERIODS: f64 = 9.0;
 /// What was recorded is told so often.
 const TOLD: Duration = Duration::from_secs(10);
 
-/// Writes the frames of a publisher to a file, to learn from or to play back.
+/// Writes the frames of a publisher to a table, or all of a running graph to a recording.
 ///
-/// It listens beside a running graph, or in its place while none runs: a model need not be there
-/// yet. It ends with Ctrl-C, or after --seconds. A pause, a jump of the clock or another `run_id`
-/// begins a new run. Frames that a graph would refuse are left out and counted.
+/// A name that ends in .mcap means a recording as the black box writes, of any length, from now on:
+/// `vigil report` and `vigil replay` read it. It goes to FILE.part while it grows, and costs the
+/// graph nothing.
+///
+/// Any other name means frames as CSV, to learn from or to play back. They are taken beside a
+/// running graph, or in its place while none runs: a model need not be there yet. A pause, a jump
+/// of the clock or another `run_id` begins a new run. Frames that a graph would refuse are left out
+/// and counted.
+///
+/// It ends with Ctrl-C, or after --duration. Exit codes: 0 done, 1 nothing came, 2 refused.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
     graph: GraphArgs,
-    /// Where to write the frames (CSV; compressed if the name ends in .gz).
+    /// Where to write: a recording if the name ends in .mcap, else frames (CSV; compressed if it
+    /// ends in .gz).
+    #[arg(
+        value_name = "FILE",
+        required_unless_present = "out",
+        conflicts_with = "out"
+    )]
+    file: Option<PathBuf>,
+    /// The same as FILE.
     #[arg(long, value_name = "F")]
-    out: PathBuf,
+    out: Option<PathBuf>,
     /// Time to record, s; until Ctrl-C if it is not given.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", visible_alias = "duration")]
     seconds: Option<f64>,
-    /// Print one JSON document.
+    /// Replace FILE if it is there. A table of frames is replaced without it.
+    #[arg(long)]
+    force: bool,
+    /// Print one JSON document, of frames only.
     #[arg(long)]
     json: bool,
+}
+
+impl Args {
+    fn path(&self) -> &Path {
+        let path = self.file.as_ref().or(self.out.as_ref());
+        path.map_or(Path::new(""), PathBuf::as_path)
+    }
 }
 
 /// What it prints with --json.
@@ -64,16 +92,27 @@ pub struct Document {
 /// Records; outcome `Failed` if no frame came.
 ///
 /// # Errors
-/// A configuration that is refused, a file that cannot be written, a transport that fails.
+/// Options that do not go together, a configuration that is refused, a graph that does not run, a
+/// file that cannot be written, a transport that fails.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let seconds = args.seconds.unwrap_or(f64::INFINITY);
     if seconds.is_nan() || seconds < 0.1 {
         let message = format!("--seconds {seconds}: allowed is 0.1 or more");
         return Err(CommandError::usage(message));
     }
+    match (flight::is_meant(args.path()), args.force) {
+        (true, _) => match flight::record(args)? {},
+        (false, true) => Err(CommandError::usage(
+            "--force goes with a recording (FILE.mcap) only",
+        )),
+        (false, false) => record_frames(args, seconds),
+    }
+}
+
+fn record_frames(args: &Args, seconds: f64) -> Result<Outcome, CommandError> {
     let mut border = args.graph.border().map_err(CommandError::usage)?;
     border.file.sensor.source = publisher::source(&border).map_err(CommandError::failure)?;
-    let mut recording = Recording::new(&border.robot, border.file.graph.rate_hz, &args.out);
+    let mut recording = Recording::new(&border.robot, border.file.graph.rate_hz, args.path());
     if !args.json {
         let graph = &border.file.graph.name;
         eprintln!("recording what publishers send to graph '{graph}'; end with Ctrl-C");
@@ -105,7 +144,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let uncommanded = Some(uncommanded).filter(|(_, count)| *count > 0);
     let document = Document {
         schema_version: 1,
-        frames_file: args.out.display().to_string(),
+        frames_file: args.path().display().to_string(),
         frames: recording.frames,
         runs: recording.runs,
         recorded_s: recording.recorded_s,

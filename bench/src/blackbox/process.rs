@@ -1,0 +1,146 @@
+//! The process of the black box, as a launcher has it.
+
+use std::fs;
+use std::io;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use vigil_cycle::{Domain, signal};
+
+/// Time in which it makes its ring, or ends.
+const LIMIT: Duration = Duration::from_secs(20);
+/// Between two looks.
+const POLL: Duration = Duration::from_millis(10);
+/// Ticks of the kernel's account of computing time in a second, on every Linux.
+const TICKS_1_S: f64 = 100.0;
+
+/// The black box, or none at present.
+pub struct Process {
+    domain: Domain,
+    child: Option<Child>,
+    /// Computing time of those that are gone, s.
+    past_cpu_s: f64,
+}
+
+impl Process {
+    /// None so far.
+    pub const fn new(domain: Domain) -> Self {
+        Self {
+            domain,
+            child: None,
+            past_cpu_s: 0.0,
+        }
+    }
+
+    /// Starts it, if there is none, and waits until it has its ring and has rescued what an earlier
+    /// one kept.
+    pub fn start(&mut self) -> io::Result<()> {
+        if self.child.is_none() {
+            self.spawn()?;
+        }
+        let began = Instant::now();
+        let ring = self.domain.ring_file();
+        let left = ring.with_extension("left");
+        while !ring.exists() || left.exists() {
+            if began.elapsed() > LIMIT {
+                return Err(io::Error::other("the black box did not come up"));
+            }
+            std::thread::sleep(POLL);
+        }
+        Ok(())
+    }
+
+    /// Starts it, as the launcher does.
+    pub fn spawn(&mut self) -> io::Result<()> {
+        let program = std::env::current_exe()?.with_file_name("vigil-blackbox");
+        let mut command = Command::new(program);
+        command.args(["--graph", self.domain.graph()]);
+        command.stdin(Stdio::null()).stdout(Stdio::null());
+        self.child = Some(command.stderr(Stdio::null()).spawn()?);
+        Ok(())
+    }
+
+    /// Ends it in order.
+    pub fn stop(&mut self) -> io::Result<()> {
+        if let Some(child) = &self.child {
+            signal::terminate(child.id());
+        }
+        self.reap()
+    }
+
+    /// Ends it at once.
+    pub fn kill(&mut self) -> io::Result<()> {
+        if let Some(child) = &mut self.child {
+            child.kill()?;
+        }
+        self.reap()
+    }
+
+    fn reap(&mut self) -> io::Result<()> {
+        // A process that is gone says nothing of itself.
+        let cpu_s = self.present_cpu_s();
+        if let Some(mut child) = self.child.take() {
+            child.wait()?;
+            self.past_cpu_s += cpu_s;
+        }
+        Ok(())
+    }
+
+    /// Holds it, or lets it go on.
+    pub fn hold(&self, is_held: bool) -> io::Result<()> {
+        let Some(child) = &self.child else {
+            return Ok(());
+        };
+        let word = if is_held { "-STOP" } else { "-CONT" };
+        let status = Command::new("kill")
+            .args([word, &child.id().to_string()])
+            .status()?;
+        match status.success() {
+            true => Ok(()),
+            false => Err(io::Error::other(format!("kill {word} failed"))),
+        }
+    }
+
+    /// Computing time of all processes so far, s.
+    pub fn cpu_s(&self) -> f64 {
+        self.past_cpu_s + self.present_cpu_s()
+    }
+
+    fn present_cpu_s(&self) -> f64 {
+        let text = self.read("stat");
+        // After the name in brackets: user time is the twelfth field, that of the system follows.
+        let fields = text.rsplit(')').next().unwrap_or_default();
+        let ticks = fields.split_ascii_whitespace().skip(11).take(2);
+        let ticks = ticks.filter_map(|field| field.parse::<f64>().ok());
+        ticks.sum::<f64>() / TICKS_1_S
+    }
+
+    /// Its resident memory, bytes.
+    pub fn memory_bytes(&self) -> u64 {
+        let text = self.read("status");
+        let line = text.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+        let kib = line.and_then(|rest| rest.split_ascii_whitespace().next());
+        1024 * kib.and_then(|kib| kib.parse().ok()).unwrap_or(0)
+    }
+
+    /// Its ring, bytes.
+    pub fn ring_bytes(&self) -> u64 {
+        fs::metadata(self.domain.ring_file()).map_or(0, |ring| ring.len())
+    }
+
+    fn read(&self, file: &str) -> String {
+        let Some(child) = &self.child else {
+            return String::new();
+        };
+        let path = PathBuf::from(format!("/proc/{}/{file}", child.id()));
+        fs::read_to_string(path).unwrap_or_default()
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // A held one hears nothing else.
+        let _ = self.kill();
+    }
+}

@@ -1,0 +1,171 @@
+//! A recording of a running graph into a file of somebody's own, from now on.
+
+use std::error::Error;
+use std::fs;
+use std::io::{self, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use vigil_cycle::port::Link;
+use vigil_cycle::{Clock, Graph, Monotonic, signal};
+use vigil_setup::RunningGraph;
+
+use crate::feeds::Feeds;
+use crate::folder;
+use crate::reason::Reason;
+use crate::recorder::{Cause, Destination, Material, Order, Recording, Written};
+use crate::ring::RingWriter;
+use crate::watch;
+
+/// Largest memory for what the disk has not taken yet, bytes.
+const MEMORY_BYTES: u64 = 32 << 20;
+/// Between two lines of progress, and two looks whether the graph still runs.
+const TOLD: Duration = Duration::from_secs(1);
+/// Bytes of a MiB.
+const MIB: f64 = (1 << 20) as f64;
+
+/// Records into `path` until the duration is over, somebody ends it, or the graph ends. What lies
+/// at `path` is replaced. True if there was something to record.
+///
+/// # Errors
+/// The transport's, and those of the file. What was written by then stays, with `.part` after its
+/// name.
+pub fn run(
+    running: RunningGraph,
+    path: &Path,
+    duration: Option<Duration>,
+) -> Result<bool, Box<dyn Error>> {
+    signal::install();
+    watch::keep_off(&running.setup);
+    let destination = Destination::File(path.to_owned());
+    let material = Arc::new(Material::new(running, destination)?);
+    let written = record(&material, path, duration)?;
+    if written.blocks == 0 {
+        fs::remove_file(&written.path)?;
+        watch::say("nothing was recorded");
+        return Ok(false);
+    }
+    tell(&written)?;
+    Ok(true)
+}
+
+fn record(
+    material: &Arc<Material>,
+    path: &Path,
+    duration: Option<Duration>,
+) -> Result<Written, Box<dyn Error>> {
+    let running = &material.running;
+    let (mut ring, mut progress) = (ring(running)?, Progress::new(path));
+    let mut feeds = Feeds::open(&Graph::SharedMemory(Link::join(&running.domain, "record")?))?;
+    let recording = Recording::start(material, ring.reader(), order(duration));
+    let pause = watch::pause(&running.setup);
+    let (mut is_deserted, mut news) = (false, Vec::new());
+    while !is_deserted && !signal::stop_requested() && !recording.is_over() {
+        thread::sleep(pause);
+        is_deserted = feeds.is_deserted() || progress.is_due() && !running.lives();
+        feeds.drain(&mut ring, &mut news)?;
+        news.clear();
+        material.lost.store(feeds.lost(), Ordering::Relaxed);
+    }
+    drop(progress);
+    if is_deserted {
+        watch::say("the graph has ended");
+    }
+    Ok(recording.finish()?)
+}
+
+/// A ring of its own beside that of the graph's black box; it is gone with this process.
+fn ring(running: &RunningGraph) -> io::Result<RingWriter> {
+    let id = std::process::id();
+    let path = running.domain.ring_file();
+    let path = path.with_file_name(format!("record-{id}"));
+    let memory_bytes = running.setup.file.blackbox.memory_bytes();
+    let ring = RingWriter::create(&path, memory_bytes.min(MEMORY_BYTES))?;
+    fs::remove_file(path)?;
+    Ok(ring)
+}
+
+fn order(duration: Option<Duration>) -> Order {
+    let now_ns = Monotonic.now_ns();
+    let until_ns = duration.map_or(u64::MAX, |duration| {
+        let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+        now_ns.saturating_add(ns)
+    });
+    Order {
+        cause: Cause {
+            reason: Reason::Record,
+            t_ns: now_ns,
+            text: "vigil record".to_owned(),
+        },
+        from_ns: now_ns,
+        until_ns,
+        until_ns_max: until_ns,
+    }
+}
+
+/// Says what was written; that nobody reads it is no reason to fail.
+fn tell(written: &Written) -> io::Result<()> {
+    let mut text = format!(
+        "{}: {:.1} s, {:.1} MiB, {} blocks",
+        written.path.display(),
+        written.covered.as_secs_f64(),
+        written.bytes as f64 / MIB,
+        written.blocks
+    );
+    if written.lost > 0 {
+        text.push_str(&format!(", {} lost", written.lost));
+    }
+    if written.gaps > 0 {
+        text.push_str(&format!(", {} gaps: the disk is too slow", written.gaps));
+    }
+    match writeln!(io::stdout(), "{text}") {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Says on a terminal how far a recording is.
+struct Progress {
+    part: PathBuf,
+    began: Instant,
+    told: Instant,
+    is_shown: bool,
+}
+
+impl Progress {
+    fn new(path: &Path) -> Self {
+        let now = Instant::now();
+        Self {
+            part: folder::part_of(path),
+            began: now,
+            told: now,
+            is_shown: io::stderr().is_terminal(),
+        }
+    }
+
+    /// True once a second, when it also shows it.
+    fn is_due(&mut self) -> bool {
+        if self.told.elapsed() < TOLD {
+            return false;
+        }
+        self.told = Instant::now();
+        if self.is_shown {
+            let bytes = fs::metadata(&self.part).map_or(0, |metadata| metadata.len());
+            let (passed_s, mib) = (self.began.elapsed().as_secs(), bytes as f64 / MIB);
+            let _ = write!(io::stderr(), "\r{passed_s:8} s  {mib:8.1} MiB ");
+        }
+        true
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if self.is_shown {
+            // Back to the start of the line, and clear it.
+            let _ = write!(io::stderr(), "\r\x1b[K");
+        }
+    }
+}
