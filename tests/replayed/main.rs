@@ -17,7 +17,10 @@ use vigil_timeline::WallClock;
 
 use graph::{Drive, Hiccup, now_and_then, record};
 
-const UNCHANGED: fn(&mut GraphFile) = |_| {};
+/// How a configuration is changed.
+type Change = fn(&mut GraphFile);
+
+const UNCHANGED: Change = |_| {};
 
 const ROVER: Drive = Drive {
     config: "rover.toml",
@@ -114,7 +117,7 @@ fn a_window_is_computed_from_the_first_state_that_was_handed_out() {
 #[test]
 fn every_filter_of_the_identifier_goes_on_from_its_state() {
     use vigil_diagnosis::identify::IdentifierFilter as Filter;
-    let changes: [(&str, fn(&mut GraphFile)); 7] = [
+    let changes: [(&str, Change); 7] = [
         ("bootstrap", |file| {
             file.identifier.filter = Filter::Bootstrap
         }),
@@ -144,7 +147,7 @@ fn every_filter_of_the_identifier_goes_on_from_its_state() {
 #[test]
 fn every_form_of_the_detector_and_other_graphs_go_on_from_their_state() {
     use vigil_diagnosis::detect::Form;
-    let changes: [(&str, &'static str, fn(&mut GraphFile)); 5] = [
+    let changes: [(&str, &'static str, Change); 5] = [
         ("constant", "rover.toml", |file| {
             file.detector.form = Form::Constant
         }),
@@ -191,7 +194,7 @@ fn every_policy_of_the_supervisor_goes_on_from_its_state() {
 }
 
 /// Policies that need nothing solved beforehand.
-const POLICIES: &[(&str, fn(&mut GraphFile))] = &[
+const POLICIES: &[(&str, Change)] = &[
     ("qmdp", |file| set_policy(file, "qmdp")),
     ("dm-mls", |file| set_policy(file, "dm-mls")),
     ("adm-qmdp", |file| set_policy(file, "adm-qmdp")),
@@ -262,7 +265,7 @@ fn restarts_a_new_publisher_and_blindness_are_computed_again() {
 
 #[test]
 fn other_rates_are_computed_again() {
-    let changes: [(&str, u64, fn(&mut GraphFile)); 2] = [
+    let changes: [(&str, u64, Change); 2] = [
         ("10 Hz", 600, |file| file.graph.rate_hz = 10.0),
         ("400 Hz", 10_000, |file| file.graph.rate_hz = 400.0),
     ];
