@@ -1,6 +1,7 @@
 //! The tree's groups, splits and merges, and raised draws.
 
 use super::*;
+use crate::hybrid::Modes;
 
 /// Nominal and three faults, of which 1 and 2 look alike; nothing moves.
 #[derive(Debug, Clone)]
