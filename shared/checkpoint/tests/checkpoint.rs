@@ -1,4 +1,5 @@
 //! State is saved and loaded to the last bit; whatever else is read is refused, by name.
+#![cfg(test)]
 
 use std::collections::VecDeque;
 
