@@ -21,7 +21,7 @@ pub(crate) struct FaultLife {
     pub(crate) states: Spans<FaultState>,
     pub(crate) source: u32,
     pub(crate) what: u32,
-    /// Probability when it was present last.
+    /// Its highest probability.
     pub(crate) p: f64,
     /// When it became active first, s; below 0 before the recording.
     pub(crate) active_since_s: Option<f64>,
@@ -103,7 +103,7 @@ impl Lives {
                 });
             life.states.take(t_s, Some(state));
             if record.p.is_finite() {
-                life.p = record.p;
+                life.p = life.p.max(record.p);
             }
             if is_present(state) && life.active_since_s.is_none() {
                 let now_ns = faults.header.t_publish_ns as f64;
