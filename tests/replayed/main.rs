@@ -34,7 +34,7 @@ const ROVER: Drive = Drive {
 /// What a replay has come to.
 struct Replayed {
     tallies: [Tally; 3],
-    first_difference: Option<Difference>,
+    first_difference: Option<(ServiceName, Difference)>,
     gaps: Vec<String>,
     /// True if an alarm, a fault's name and another action were computed.
     had_a_fault: [bool; 3],
@@ -53,6 +53,7 @@ fn replay(path: &Path) -> Replayed {
     while let Some(moment) = replay.next_moment().unwrap() {
         match moment.what {
             What::Answered(answer, difference) => {
+                let difference = difference.map(|it| (moment.service, it));
                 first_difference = first_difference.or(difference);
                 match answer {
                     vigil_replay::Answer::Detection(belief) => had_a_fault[0] |= belief.alarm != 0,
@@ -63,9 +64,9 @@ fn replay(path: &Path) -> Replayed {
                 }
             }
             What::StateDiffers(difference) => {
-                first_difference.get_or_insert(difference);
+                first_difference.get_or_insert((moment.service, difference));
             }
-            What::Gap(gap) => gaps.push(format!("{}: {}", gap.service.as_str(), gap.what)),
+            What::Gap(what) => gaps.push(format!("{}: {what}", moment.service.as_str())),
             What::Begins => {}
         }
     }
@@ -321,8 +322,8 @@ fn a_bit_that_is_not_the_same_is_named() {
         }
         true
     });
-    let difference = replayed.first_difference.unwrap();
-    let named = (difference.service, difference.field.as_str());
+    let (service, difference) = replayed.first_difference.unwrap();
+    let named = (service, difference.field.as_str());
     assert_eq!(named, (ServiceName::Identifier, "p[1]"));
     assert_ne!(difference.recorded, difference.computed);
     assert_eq!(replayed.tallies.map(|tally| tally.different), [0, 1, 0]);

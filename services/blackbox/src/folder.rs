@@ -113,13 +113,6 @@ pub fn adopt(part: &Path) -> Option<PathBuf> {
     Some(cut)
 }
 
-/// The unfinished form of a recording.
-pub fn part_of(whole: &Path) -> PathBuf {
-    let mut part = whole.as_os_str().to_owned();
-    part.push(".part");
-    part.into()
-}
-
 /// Makes the folder, and a file in it for a moment.
 fn writable(folder: &Path) -> io::Result<()> {
     fs::create_dir_all(folder)?;
@@ -138,6 +131,7 @@ struct RecordingFile {
 mod tests {
     use super::*;
     use std::time::Duration;
+    use vigil_flight::part_path;
 
     fn folder(path: &Path, bytes_max: u64) -> RecordingsFolder {
         RecordingsFolder::open(&[path.to_owned()], "rover", bytes_max).unwrap()
@@ -197,9 +191,9 @@ mod tests {
         let whole = folder.name("2026-11-28T18:00:01.250Z", "alarm");
         let name = "rover-20261128T180001.250Z-alarm";
         assert!(whole.ends_with(format!("{name}.mcap")), "{whole:?}");
-        fs::write(part_of(&whole), "x").unwrap();
+        fs::write(part_path(&whole), "x").unwrap();
         let empty = folder.name("2026-11-28T18:00:02.250Z", "alarm");
-        fs::write(part_of(&empty), "").unwrap();
+        fs::write(part_path(&empty), "").unwrap();
         fs::write(folder.path().join("mine.mcap.part"), "x").unwrap();
         let adopted = folder.adopt_parts();
         assert_eq!(adopted, [folder.path().join(format!("{name}-cut.mcap"))]);

@@ -11,10 +11,10 @@ use std::time::{Duration, Instant};
 
 use vigil_cycle::port::Link;
 use vigil_cycle::{Clock, Graph, Monotonic, signal};
+use vigil_flight::part_path;
 use vigil_setup::RunningGraph;
 
 use crate::feeds::Feeds;
-use crate::folder;
 use crate::reason::Reason;
 use crate::recorder::{Cause, Destination, Material, Order, Recording, Written};
 use crate::ring::RingWriter;
@@ -61,7 +61,7 @@ fn record(
     let (mut ring, mut progress) = (ring(running)?, Progress::new(path));
     let mut feeds = Feeds::open(&Graph::SharedMemory(Link::join(&running.domain, "record")?))?;
     let recording = Recording::start(material, ring.reader(), order(duration));
-    let pause = watch::pause(&running.setup);
+    let pause = running.setup.observer_pause();
     let (mut is_deserted, mut news) = (false, Vec::new());
     while !is_deserted && !signal::stop_requested() && !recording.is_over() {
         thread::sleep(pause);
@@ -139,7 +139,7 @@ impl Progress {
     fn new(path: &Path) -> Self {
         let now = Instant::now();
         Self {
-            part: folder::part_of(path),
+            part: part_path(path),
             began: now,
             told: now,
             is_shown: io::stderr().is_terminal(),

@@ -10,7 +10,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use vigil_cycle::{Clock, Monotonic, Topic};
-use vigil_flight::{FlightError, FlightWriter};
+use vigil_flight::{FlightError, FlightWriter, part_path};
 use vigil_setup::RunningGraph;
 use vigil_timeline::{EventReader, TimelineEntry, WallClock};
 
@@ -226,7 +226,7 @@ fn write(
         }
         Err(error) => {
             if let Destination::Folder(_) = destination {
-                folder::adopt(&folder::part_of(&path));
+                folder::adopt(&part_path(&path));
             }
             Err(error)
         }

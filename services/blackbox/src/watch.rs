@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread;
-use std::time::Duration;
 
 use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
@@ -20,8 +19,6 @@ use crate::reason::Reason;
 use crate::recorder::{Cause, Destination, Material, Order, Recording};
 use crate::ring::{RingReader, RingWriter};
 
-/// Longest pause between two looks: what is lost when this process is killed.
-const POLL_MAX: Duration = Duration::from_millis(50);
 /// Nanoseconds of a second.
 const NS: f64 = 1e9;
 /// A recording is at most so many times as long after its first cause as after its last.
@@ -128,7 +125,7 @@ fn keep(material: &Arc<Material>, rescue: &mut Option<Rescue>) -> Result<(), Box
         ring,
         recordings: Vec::new(),
     };
-    let pause = pause(setup);
+    let pause = setup.observer_pause();
     let mut ends = false;
     while !ends {
         // The last look comes after the order to stop.
@@ -142,13 +139,6 @@ fn keep(material: &Arc<Material>, rescue: &mut Option<Rescue>) -> Result<(), Box
     }
     blackbox.recordings.into_iter().for_each(tell);
     Ok(())
-}
-
-/// Between two looks: half the time in which the shortest queue fills.
-pub fn pause(setup: &Setup) -> Duration {
-    let period = Duration::from_secs_f64(1.0 / setup.file.graph.rate_hz);
-    let buffer = u32::try_from(setup.file.transport.buffer).unwrap_or(2);
-    (period * buffer / 2).min(POLL_MAX)
 }
 
 /// Decides what is written when.

@@ -21,6 +21,11 @@ pub enum Entry<I> {
     Reset,
 }
 
+/// The block of this name; epoch 0 stands for none.
+fn named(epoch: u64, seq: u64) -> Option<BlockId> {
+    (epoch != 0).then_some(BlockId { epoch, seq })
+}
+
 /// Entries in a block.
 pub const JOURNAL_ENTRIES: usize = 8;
 
@@ -101,15 +106,13 @@ impl JournalEntry {
     /// The input, if there is one.
     #[must_use]
     pub fn input(&self) -> Option<BlockId> {
-        let (epoch, seq) = (self.input_epoch, self.input_seq);
-        (epoch != 0).then_some(BlockId { epoch, seq })
+        named(self.input_epoch, self.input_seq)
     }
 
     /// The detection, if there is one.
     #[must_use]
     pub fn detection(&self) -> Option<BlockId> {
-        let (epoch, seq) = (self.detection_epoch, self.detection_seq);
-        (epoch != 0).then_some(BlockId { epoch, seq })
+        named(self.detection_epoch, self.detection_seq)
     }
 }
 
@@ -142,8 +145,7 @@ impl Journal {
     /// The block that was published after these entries, if there is one.
     #[must_use]
     pub fn answer(&self) -> Option<BlockId> {
-        let (epoch, seq) = (self.answer_epoch, self.answer_seq);
-        (epoch != 0).then_some(BlockId { epoch, seq })
+        named(self.answer_epoch, self.answer_seq)
     }
 }
 

@@ -5,7 +5,7 @@ use proc_macro2::TokenStream as Tokens;
 use quote::{format_ident, quote};
 use syn::spanned::Spanned;
 use syn::{
-    Data, DeriveInput, Error, Field, Fields, Generics, Index, Member, Path, Variant,
+    Data, DeriveInput, Error, Field, Fields, Generics, Ident, Index, Member, Path, Variant,
     parse_macro_input,
 };
 
@@ -30,22 +30,24 @@ enum Part {
 /// `#[checkpoint(bound = "T: Bound")]` on the type adds a bound.
 #[proc_macro_derive(Checkpoint, attributes(checkpoint))]
 pub fn derive_checkpoint(input: TokenStream) -> TokenStream {
-    let input = parse_macro_input!(input as DeriveInput);
-    let derived = match &input.data {
-        Data::Struct(data) => in_place_struct(&input, &data.fields),
-        Data::Enum(data) => in_place_enum(&input, data.variants.iter()),
-        Data::Union(_) => Err(Error::new(input.span(), "a union has no state of its own")),
-    };
-    derived.unwrap_or_else(Error::into_compile_error).into()
+    derive(input, in_place_struct, in_place_enum)
 }
 
 /// Derives `Checkpoint` and `CheckpointValue`: the whole value is state, and is made anew.
 #[proc_macro_derive(CheckpointValue, attributes(checkpoint))]
 pub fn derive_checkpoint_value(input: TokenStream) -> TokenStream {
+    derive(input, value_struct, value_enum)
+}
+
+fn derive(
+    input: TokenStream,
+    of_struct: fn(&DeriveInput, &Fields) -> Result<Tokens, Error>,
+    of_enum: fn(&DeriveInput, &[&Variant]) -> Result<Tokens, Error>,
+) -> TokenStream {
     let input = parse_macro_input!(input as DeriveInput);
     let derived = match &input.data {
-        Data::Struct(data) => value_struct(&input, &data.fields),
-        Data::Enum(data) => value_enum(&input, data.variants.iter()),
+        Data::Struct(data) => of_struct(&input, &data.fields),
+        Data::Enum(data) => of_enum(&input, &data.variants.iter().collect::<Vec<_>>()),
         Data::Union(_) => Err(Error::new(input.span(), "a union has no state of its own")),
     };
     derived.unwrap_or_else(Error::into_compile_error).into()
@@ -152,6 +154,50 @@ fn load_of(part: &Part, of: &Tokens) -> Tokens {
     }
 }
 
+/// A pattern that takes a variant apart, and the names it gives the fields.
+fn pattern(variant: &Variant) -> (Tokens, Vec<Ident>) {
+    let members = members(&variant.fields);
+    let names: Vec<_> = (0..members.len())
+        .map(|i| format_ident!("field_{i}"))
+        .collect();
+    let name = &variant.ident;
+    (quote!(Self::#name { #(#members: #names),* }), names)
+}
+
+/// `Checkpoint`, from what saves and what loads.
+fn in_place(input: &DeriveInput, save: &Tokens, load: &Tokens) -> Result<Tokens, Error> {
+    let name = &input.ident;
+    let generics = bounded(input)?;
+    let (of, types, bounds) = generics.split_for_impl();
+    Ok(quote! {
+        impl #of vigil_checkpoint::Checkpoint for #name #types #bounds {
+            #[allow(unused_variables)]
+            fn save(&self, to: &mut vigil_checkpoint::CheckpointWriter<'_>) {
+                #save
+            }
+            #[allow(unused_variables)]
+            fn load(&mut self, from: &mut vigil_checkpoint::CheckpointReader<'_>) {
+                #load
+            }
+        }
+    })
+}
+
+/// `CheckpointValue`, beside `Checkpoint`, from what reads.
+fn value(input: &DeriveInput, in_place: &Tokens, read: &Tokens) -> Result<Tokens, Error> {
+    let name = &input.ident;
+    let generics = bounded(input)?;
+    let (of, types, bounds) = generics.split_for_impl();
+    Ok(quote! {
+        #in_place
+        impl #of vigil_checkpoint::CheckpointValue for #name #types #bounds {
+            fn read(from: &mut vigil_checkpoint::CheckpointReader<'_>) -> Self {
+                #read
+            }
+        }
+    })
+}
+
 fn in_place_struct(input: &DeriveInput, fields: &Fields) -> Result<Tokens, Error> {
     let (mut saves, mut loads) = (Vec::new(), Vec::new());
     for (field, member) in fields.iter().zip(members(fields)) {
@@ -159,35 +205,17 @@ fn in_place_struct(input: &DeriveInput, fields: &Fields) -> Result<Tokens, Error
         saves.push(save_of(&part, &quote!((&self.#member))));
         loads.push(load_of(&part, &quote!((&mut self.#member))));
     }
-    let (name, text, mark) = (&input.ident, input.ident.to_string(), mark(input, fields)?);
-    let generics = bounded(input)?;
-    let (of, types, bounds) = generics.split_for_impl();
-    Ok(quote! {
-        impl #of vigil_checkpoint::Checkpoint for #name #types #bounds {
-            fn save(&self, to: &mut vigil_checkpoint::CheckpointWriter<'_>) {
-                to.mark(#mark);
-                #(#saves)*
-            }
-            fn load(&mut self, from: &mut vigil_checkpoint::CheckpointReader<'_>) {
-                from.expect(#mark, #text);
-                #(#loads)*
-            }
-        }
-    })
+    let (text, mark) = (input.ident.to_string(), mark(input, fields)?);
+    let save = quote!(to.mark(#mark); #(#saves)*);
+    let load = quote!(from.expect(#mark, #text); #(#loads)*);
+    in_place(input, &save, &load)
 }
 
-fn in_place_enum<'a>(
-    input: &DeriveInput,
-    variants: impl Iterator<Item = &'a Variant>,
-) -> Result<Tokens, Error> {
-    let (name, text) = (&input.ident, input.ident.to_string());
+fn in_place_enum(input: &DeriveInput, variants: &[&Variant]) -> Result<Tokens, Error> {
+    let text = input.ident.to_string();
     let (mut saves, mut loads) = (Vec::new(), Vec::new());
-    for (tag, variant) in variants.enumerate() {
-        let variant_name = &variant.ident;
-        let members = members(&variant.fields);
-        let names: Vec<_> = (0..members.len())
-            .map(|i| format_ident!("field_{i}"))
-            .collect();
+    for (tag, variant) in variants.iter().enumerate() {
+        let (pattern, names) = pattern(variant);
         let mark = mark(input, &variant.fields)? ^ tag as u32;
         let (mut save, mut load) = (Vec::new(), Vec::new());
         for (field, name) in variant.fields.iter().zip(&names) {
@@ -195,68 +223,45 @@ fn in_place_enum<'a>(
             save.push(save_of(&part, &quote!(#name)));
             load.push(load_of(&part, &quote!(#name)));
         }
-        let pattern = quote!(Self::#variant_name { #(#members: #names),* });
         saves.push(quote!(#pattern => { to.mark(#mark); #(#save)* }));
         loads.push(quote!(#pattern => { from.expect(#mark, #text); #(#load)* }));
     }
-    let generics = bounded(input)?;
-    let (of, types, bounds) = generics.split_for_impl();
-    Ok(quote! {
-        impl #of vigil_checkpoint::Checkpoint for #name #types #bounds {
-            #[allow(unused_variables)]
-            fn save(&self, to: &mut vigil_checkpoint::CheckpointWriter<'_>) {
-                match self { #(#saves)* }
-            }
-            #[allow(unused_variables)]
-            fn load(&mut self, from: &mut vigil_checkpoint::CheckpointReader<'_>) {
-                match self { #(#loads)* }
-            }
-        }
-    })
+    let save = quote!(match self { #(#saves)* });
+    in_place(input, &save, &quote!(match self { #(#loads)* }))
 }
 
 fn value_struct(input: &DeriveInput, fields: &Fields) -> Result<Tokens, Error> {
-    let in_place = in_place_struct(input, fields)?;
-    let members = members(fields);
     for field in fields {
         if !matches!(part(field)?, Part::State) {
             return Err(Error::new(field.span(), "a value has no fixed parts"));
         }
     }
-    let (name, text, mark) = (&input.ident, input.ident.to_string(), mark(input, fields)?);
-    let generics = bounded(input)?;
-    let (of, types, bounds) = generics.split_for_impl();
-    Ok(quote! {
-        #in_place
-        impl #of vigil_checkpoint::CheckpointValue for #name #types #bounds {
-            fn read(from: &mut vigil_checkpoint::CheckpointReader<'_>) -> Self {
-                from.expect(#mark, #text);
-                Self { #(#members: vigil_checkpoint::CheckpointValue::read(from)),* }
-            }
-        }
-    })
+    let (members, text, mark) = (
+        members(fields),
+        input.ident.to_string(),
+        mark(input, fields)?,
+    );
+    let read = quote! {
+        from.expect(#mark, #text);
+        Self { #(#members: vigil_checkpoint::CheckpointValue::read(from)),* }
+    };
+    value(input, &in_place_struct(input, fields)?, &read)
 }
 
-fn value_enum<'a>(
-    input: &DeriveInput,
-    variants: impl Iterator<Item = &'a Variant>,
-) -> Result<Tokens, Error> {
-    let (name, text) = (&input.ident, input.ident.to_string());
-    let variants: Vec<_> = variants.collect();
-    let mark = mark_of_variants(input, &variants)?;
+fn value_enum(input: &DeriveInput, variants: &[&Variant]) -> Result<Tokens, Error> {
+    let text = input.ident.to_string();
+    let mark = mark_of_variants(input, variants)?;
     let (mut saves, mut reads) = (Vec::new(), Vec::new());
     for (tag, variant) in variants.iter().enumerate() {
         let (variant_name, tag) = (&variant.ident, tag as u32);
-        let members = members(&variant.fields);
-        let names: Vec<_> = (0..members.len())
-            .map(|i| format_ident!("field_{i}"))
-            .collect();
+        let (pattern, names) = pattern(variant);
         saves.push(quote! {
-            Self::#variant_name { #(#members: #names),* } => {
+            #pattern => {
                 to.mark(#mark | #tag);
                 #(vigil_checkpoint::Checkpoint::save(#names, to);)*
             }
         });
+        let members = members(&variant.fields);
         let read = quote! {
             Self::#variant_name { #(#members: vigil_checkpoint::CheckpointValue::read(from)),* }
         };
@@ -268,22 +273,8 @@ fn value_enum<'a>(
     }
     reads.rotate_left(1);
     let count = variants.len() as u32;
-    let generics = bounded(input)?;
-    let (of, types, bounds) = generics.split_for_impl();
-    Ok(quote! {
-        impl #of vigil_checkpoint::Checkpoint for #name #types #bounds {
-            #[allow(unused_variables)]
-            fn save(&self, to: &mut vigil_checkpoint::CheckpointWriter<'_>) {
-                match self { #(#saves)* }
-            }
-            fn load(&mut self, from: &mut vigil_checkpoint::CheckpointReader<'_>) {
-                *self = vigil_checkpoint::CheckpointValue::read(from);
-            }
-        }
-        impl #of vigil_checkpoint::CheckpointValue for #name #types #bounds {
-            fn read(from: &mut vigil_checkpoint::CheckpointReader<'_>) -> Self {
-                match from.variant(#mark, #count, #text) { #(#reads)* }
-            }
-        }
-    })
+    let save = quote!(match self { #(#saves)* });
+    let load = quote!(*self = vigil_checkpoint::CheckpointValue::read(from););
+    let read = quote!(match from.variant(#mark, #count, #text) { #(#reads)* });
+    value(input, &in_place(input, &save, &load)?, &read)
 }

@@ -119,41 +119,33 @@ impl<T: CheckpointValue> CheckpointValue for Box<T> {
     }
 }
 
-impl<T: CheckpointValue> Checkpoint for Vec<T> {
-    fn save(&self, to: &mut CheckpointWriter<'_>) {
-        to.mark(self.len() as u32);
-        self.iter().for_each(|one| one.save(to));
-    }
-    /// Keeps the room that there is.
-    fn load(&mut self, from: &mut CheckpointReader<'_>) {
-        self.clear();
-        let length = from.length("Vec");
-        // Nothing more after a misfit: a length alone takes no memory.
-        self.extend((0..length).map_while(|_| from.is_sound().then(|| T::read(from))));
-    }
+macro_rules! sequences {
+    ($($sequence:ident),*) => {$(
+        impl<T: CheckpointValue> Checkpoint for $sequence<T> {
+            fn save(&self, to: &mut CheckpointWriter<'_>) {
+                to.mark(self.len() as u32);
+                self.iter().for_each(|one| one.save(to));
+            }
+            /// Keeps the room that there is.
+            fn load(&mut self, from: &mut CheckpointReader<'_>) {
+                self.clear();
+                let length = from.length(stringify!($sequence));
+                // Nothing more after a misfit: a length alone takes no memory.
+                let sound = (0..length).map_while(|_| from.is_sound().then(|| T::read(from)));
+                self.extend(sound);
+            }
+        }
+        impl<T: CheckpointValue> CheckpointValue for $sequence<T> {
+            fn read(from: &mut CheckpointReader<'_>) -> Self {
+                let mut all = Self::new();
+                all.load(from);
+                all
+            }
+        }
+    )*};
 }
 
-impl<T: CheckpointValue> CheckpointValue for Vec<T> {
-    fn read(from: &mut CheckpointReader<'_>) -> Self {
-        let mut all = Self::new();
-        all.load(from);
-        all
-    }
-}
-
-impl<T: CheckpointValue> Checkpoint for VecDeque<T> {
-    fn save(&self, to: &mut CheckpointWriter<'_>) {
-        to.mark(self.len() as u32);
-        self.iter().for_each(|one| one.save(to));
-    }
-    /// Keeps the room that there is.
-    fn load(&mut self, from: &mut CheckpointReader<'_>) {
-        self.clear();
-        let length = from.length("VecDeque");
-        // Nothing more after a misfit: a length alone takes no memory.
-        self.extend((0..length).map_while(|_| from.is_sound().then(|| T::read(from))));
-    }
-}
+sequences!(Vec, VecDeque);
 
 impl<T: CheckpointValue> Checkpoint for Option<T> {
     fn save(&self, to: &mut CheckpointWriter<'_>) {

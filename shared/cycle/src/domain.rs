@@ -56,6 +56,14 @@ pub struct Domain {
     queues: Queues,
 }
 
+/// Tells one start of a graph from another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GraphStart {
+    list_inode: u64,
+    written_s: i64,
+    written_ns: i64,
+}
+
 impl Domain {
     /// The place of `graph`; creates its runtime folder (mode 0700).
     ///
@@ -106,9 +114,14 @@ impl Domain {
     }
 
     /// What is different after each start of the graph: when its list of processes was written.
-    pub(crate) fn start(&self) -> Option<(u64, i64, i64)> {
+    #[must_use]
+    pub fn start(&self) -> Option<GraphStart> {
         let list = fs::metadata(self.processes_file()).ok()?;
-        Some((list.ino(), list.mtime(), list.mtime_nsec()))
+        Some(GraphStart {
+            list_inode: list.ino(),
+            written_s: list.mtime(),
+            written_ns: list.mtime_nsec(),
+        })
     }
 
     /// Name of the graph.

@@ -15,7 +15,7 @@ use crate::topic::{ServiceName, Topic};
 
 /// Time between two states that are handed out, ns. All services do it at the same instants of the
 /// schedule. Chosen: a recording can be computed again from its first ten seconds on.
-pub const CHECKPOINT_PERIOD_NS: u64 = 10_000_000_000;
+const CHECKPOINT_PERIOD_NS: u64 = 10_000_000_000;
 /// Entries of a turn at most: more than queues hold by default.
 const ENTRIES_MAX: usize = 1024;
 

@@ -9,7 +9,7 @@ use std::time::Duration;
 use vigil_blocks::SensorFrame;
 
 use crate::clock::{Clock, Monotonic};
-use crate::domain::Domain;
+use crate::domain::{Domain, GraphStart};
 use crate::port::{Graph, Link, Sender, Stamp};
 use crate::port_error::PortError;
 use crate::topic::Topic;
@@ -62,7 +62,7 @@ struct Joined {
     // Before the link that it was opened with.
     sender: Box<dyn Sender<SensorFrame>>,
     _graph: Graph,
-    start: Option<(u64, i64, i64)>,
+    start: Option<GraphStart>,
 }
 
 impl Publisher {

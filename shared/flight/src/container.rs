@@ -66,8 +66,9 @@ pub(crate) struct Container {
     cdr: Cdr,
 }
 
-/// Where the file stands until it is whole.
-fn part_path(path: &Path) -> PathBuf {
+/// Where a recording stands until it is whole.
+#[must_use]
+pub fn part_path(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".part");
     name.into()

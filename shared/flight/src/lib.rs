@@ -18,6 +18,7 @@ mod translation;
 mod writer;
 
 pub use block_bytes::{read_block, read_header};
+pub use container::part_path;
 pub use error::FlightError;
 pub use live::{LiveMessages, MessageTaker, RosMessage};
 pub use reader::{FlightReader, Recorded};

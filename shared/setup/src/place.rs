@@ -1,5 +1,7 @@
 //! From the configuration to what the cycle needs.
 
+use std::time::Duration;
+
 use vigil_cycle::placement::PlacementRequest;
 use vigil_cycle::serve::{Leave, ServicePlan};
 use vigil_cycle::topic::ServiceName;
@@ -8,11 +10,23 @@ use vigil_cycle::{Domain, PortError, Schedule, service};
 use crate::border::Border;
 use crate::load::Setup;
 
+/// Longest pause of an observer: what the black box loses when it is killed.
+const OBSERVER_PAUSE_MAX: Duration = Duration::from_millis(50);
+
 impl Setup {
     /// Period of the schedule, ns.
     #[must_use]
     pub fn period_ns(&self) -> u64 {
         self.file.graph.period_ns()
+    }
+
+    /// Between two looks of who observes every topic: half the time in which the shortest queue
+    /// fills, and 50 ms at most.
+    #[must_use]
+    pub fn observer_pause(&self) -> Duration {
+        let period = Duration::from_secs_f64(1.0 / self.file.graph.rate_hz);
+        let buffer = u32::try_from(self.file.transport.buffer).unwrap_or(2);
+        (period * buffer / 2).min(OBSERVER_PAUSE_MAX)
     }
 
     /// What its publishers meet.

@@ -2,22 +2,11 @@
 
 use std::collections::VecDeque;
 
-use vigil_blocks::{BlockId, Journal, JournalKind};
+use vigil_blocks::{BlockId, Journal, JournalEntry, JournalKind};
 use vigil_cycle::topic::ServiceName;
 
 use crate::checkpoints::Checkpoints;
 use crate::step::Step;
-
-/// What was not recorded: the service waits for its next state.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Gap {
-    /// Which service.
-    pub service: ServiceName,
-    /// When, ns since 1970.
-    pub t_ns: u64,
-    /// What is missing.
-    pub what: String,
-}
 
 /// What became of a service's answers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -97,6 +86,6 @@ impl Course {
 }
 
 /// True if a service begins with this entry.
-pub(crate) fn begins(entry: &vigil_blocks::JournalEntry) -> bool {
+pub(crate) fn begins(entry: &JournalEntry) -> bool {
     entry.kind == JournalKind::Begun as u32
 }

@@ -2,21 +2,17 @@
 
 use vigil_blocks::layout::{Field, Layout};
 use vigil_blocks::{Block, BlockId};
-use vigil_cycle::topic::ServiceName;
 
 /// Fields that belong to the ports, not to the step.
 const OF_THE_PORTS: [&str; 3] = ["header", "cause", "valid_until_ns"];
 
-/// The first field in which a recorded block and the computed one differ.
+/// The first place in which something recorded and something computed differ.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Difference {
-    /// Whose answer it is.
-    pub service: ServiceName,
-    /// When it was published, ns since 1970.
-    pub t_ns: u64,
     /// The recorded block; after which block of the journal, for a state.
     pub block: BlockId,
-    /// Name of the field, with the element's index for an array; `state` for a state.
+    /// Name of the field, with the element's index for an array; of a state, from which byte
+    /// on.
     pub field: String,
     /// What was recorded.
     pub recorded: String,
@@ -24,23 +20,39 @@ pub struct Difference {
     pub computed: String,
 }
 
-/// Name and values of the first field that is not the same, bit by bit.
-pub(crate) fn first_difference<T: Block + Layout>(
-    recorded: &T,
-    computed: &T,
-) -> Option<[String; 3]> {
+/// The first field that is not the same, bit by bit.
+pub(crate) fn of_blocks<T: Block + Layout>(recorded: &T, computed: &T) -> Option<Difference> {
+    let block = recorded.header().id();
     let (recorded, computed) = (bytemuck::bytes_of(recorded), bytemuck::bytes_of(computed));
     let fields = T::FIELDS.iter();
     let compared = fields.filter(|field| !OF_THE_PORTS.contains(&field.name));
     compared.into_iter().find_map(|field| {
         let range = field.offset..field.offset + field.size;
         let (recorded, computed) = (recorded.get(range.clone())?, computed.get(range)?);
-        (recorded != computed).then(|| of_field(field, recorded, computed))
+        (recorded != computed).then(|| of_field(block, field, (recorded, computed)))
     })
 }
 
+/// Where two states, which were handed out after this block of the journal, are not the same
+/// first, and the eight bytes there.
+pub(crate) fn of_states(block: BlockId, recorded: &[u8], computed: &[u8]) -> Difference {
+    let same = recorded.iter().zip(computed).take_while(|(a, b)| a == b);
+    let at = same.count();
+    let words = |bytes: &[u8]| {
+        let rest = bytes.get(at..).unwrap_or_default().iter().take(8);
+        let hex: String = rest.map(|byte| format!("{byte:02x}")).collect();
+        format!("{hex} ({} bytes)", bytes.len())
+    };
+    Difference {
+        block,
+        field: format!("state, from byte {at} on"),
+        recorded: words(recorded),
+        computed: words(computed),
+    }
+}
+
 /// The first element that is not the same.
-fn of_field(field: &Field, recorded: &[u8], computed: &[u8]) -> [String; 3] {
+fn of_field(block: BlockId, field: &Field, (recorded, computed): (&[u8], &[u8])) -> Difference {
     let (is_array, element) = match field.type_text.strip_prefix('[') {
         Some(array) => (true, array.split(';').next().unwrap_or_default()),
         None => (false, field.type_text),
@@ -59,7 +71,12 @@ fn of_field(field: &Field, recorded: &[u8], computed: &[u8]) -> [String; 3] {
         true => format!("{}[{index}]", field.name),
         false => field.name.to_owned(),
     };
-    [name, number(element, a), number(element, b)]
+    Difference {
+        block,
+        field: name,
+        recorded: number(element, a),
+        computed: number(element, b),
+    }
 }
 
 /// A number in words; bytes of anything else.
@@ -86,16 +103,17 @@ mod tests {
         let recorded = DetectionBelief::default();
         let mut computed = recorded;
         computed.header.seq = 7;
-        assert_eq!(first_difference(&recorded, &computed), None);
+        assert_eq!(of_blocks(&recorded, &computed), None);
         computed.alarm_count = 3;
         computed.channel_log_odds[2] = -0.0;
-        let [name, before, after] = first_difference(&recorded, &computed).unwrap();
-        assert_eq!(name, "channel_log_odds[2]");
-        let bits = (before.as_str(), after.as_str());
+        let found = of_blocks(&recorded, &computed).unwrap();
+        assert_eq!(found.field, "channel_log_odds[2]");
+        let bits = (found.recorded.as_str(), found.computed.as_str());
         assert_eq!(bits, ("0.0 (0000000000000000)", "-0.0 (8000000000000000)"));
         computed.channel_log_odds[2] = 0.0;
-        let [name, before, after] = first_difference(&recorded, &computed).unwrap();
-        let said = (name.as_str(), before.as_str(), after.as_str());
+        let found = of_blocks(&recorded, &computed).unwrap();
+        let values = (found.recorded.as_str(), found.computed.as_str());
+        let said = (found.field.as_str(), values.0, values.1);
         assert_eq!(said, ("alarm_count", "0", "3"));
     }
 }

@@ -8,7 +8,7 @@ mod error;
 mod replay;
 mod step;
 
-pub use course::{Gap, Tally};
+pub use course::Tally;
 pub use difference::Difference;
 pub use error::ReplayError;
 pub use replay::{Answer, Moment, Replay, What};

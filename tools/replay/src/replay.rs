@@ -15,8 +15,8 @@ use vigil_flight::{FlightReader, Recorded, read_block};
 use vigil_setup::{Document, Setup};
 
 use crate::blocks::{Blocks, Hypotheses, Window};
-use crate::course::{Course, Gap, Standing, Tally, begins};
-use crate::difference::{Difference, first_difference};
+use crate::course::{Course, Standing, Tally, begins};
+use crate::difference::{self, Difference};
 use crate::error::ReplayError;
 use crate::step::{Answers, Step};
 
@@ -50,8 +50,8 @@ pub enum What {
     Begins,
     /// The state is not the one that the service has handed out.
     StateDiffers(Difference),
-    /// Something was not recorded.
-    Gap(Gap),
+    /// This was not recorded: the service waits for its next state.
+    Gap(String),
 }
 
 /// A moment of the replay.
@@ -284,12 +284,7 @@ impl Replay {
         let course = &mut self.courses[place];
         course.tally.gaps += 1;
         let service = course.service;
-        let gap = Gap {
-            service,
-            t_ns,
-            what: what.to_owned(),
-        };
-        self.note(t_ns, service, What::Gap(gap));
+        self.note(t_ns, service, What::Gap(what.to_owned()));
     }
 
     /// Compares an answer with what was published.
@@ -324,16 +319,7 @@ impl Replay {
         let service = course.service;
         course.tally.compared += u64::from(compared.is_some());
         course.tally.unrecorded += u64::from(compared.is_none());
-        let difference = compared
-            .flatten()
-            .map(|[field, recorded, computed]| Difference {
-                service,
-                t_ns,
-                block: id,
-                field,
-                recorded,
-                computed,
-            });
+        let difference = compared.flatten();
         course.tally.different += u64::from(difference.is_some());
         self.note(t_ns, service, What::Answered(answer, difference));
     }
@@ -364,16 +350,8 @@ impl Replay {
             if computed == Some(recorded.bytes.as_slice()) {
                 return;
             }
-            let (field, recorded, computed) =
-                difference_of_states(&recorded.bytes, computed.unwrap_or_default());
-            let difference = Difference {
-                service,
-                t_ns,
-                block: id,
-                field,
-                recorded,
-                computed,
-            };
+            let computed = computed.unwrap_or_default();
+            let difference = difference::of_states(id, &recorded.bytes, computed);
             course.tally.different += 1;
             self.note(t_ns, service, What::StateDiffers(difference));
         }
@@ -391,25 +369,12 @@ impl Replay {
     }
 }
 
-/// Where two states of a step differ first, and the eight bytes there.
-fn difference_of_states(recorded: &[u8], computed: &[u8]) -> (String, String, String) {
-    let same = recorded.iter().zip(computed).take_while(|(a, b)| a == b);
-    let at = same.count();
-    let words = |bytes: &[u8]| {
-        let rest = bytes.get(at..).unwrap_or_default().iter().take(8);
-        let hex: String = rest.map(|byte| format!("{byte:02x}")).collect();
-        format!("{hex} ({} bytes)", bytes.len())
-    };
-    let field = format!("state, from byte {at} on");
-    (field, words(recorded), words(computed))
-}
-
 /// What differs, if anything does; `None` if the block was not recorded.
 fn compared<T: Block + Layout>(
     recorded: &Window<T>,
     id: BlockId,
     computed: &T,
-) -> Option<Option<[String; 3]>> {
+) -> Option<Option<Difference>> {
     let recorded = recorded.get(id)?;
-    Some(first_difference(recorded, computed))
+    Some(difference::of_blocks(recorded, computed))
 }

@@ -57,22 +57,15 @@ pub(crate) enum Step {
 impl Step {
     /// The step at the start of a service, which is one of those that step.
     pub(crate) fn new(service: ServiceName, setup: &Setup) -> Result<Self, ReplayError> {
-        let refused = |error: String| ReplayError::Build {
-            service: service.as_str(),
-            reason: error,
-        };
         Ok(match service {
             ServiceName::Identifier => {
-                let step = vigil_identifier::assemble(setup);
-                Self::Identifier(Box::new(step.map_err(|error| refused(error.to_string()))?))
+                Self::Identifier(built(service, vigil_identifier::assemble(setup))?)
             }
             ServiceName::Supervisor => {
-                let step = vigil_supervisor::assemble(setup);
-                Self::Supervisor(Box::new(step.map_err(|error| refused(error.to_string()))?))
+                Self::Supervisor(built(service, vigil_supervisor::assemble(setup))?)
             }
             ServiceName::SensorSim | ServiceName::Detector => {
-                let step = vigil_detector::assemble(setup);
-                Self::Detector(Box::new(step.map_err(|error| refused(error.to_string()))?))
+                Self::Detector(built(service, vigil_detector::assemble(setup))?)
             }
         })
     }
@@ -114,6 +107,17 @@ impl Step {
         }
         reader.finish()
     }
+}
+
+/// A step that a service has assembled.
+fn built<T>(
+    service: ServiceName,
+    step: Result<T, impl std::error::Error>,
+) -> Result<Box<T>, ReplayError> {
+    step.map(Box::new).map_err(|error| ReplayError::Build {
+        service: service.as_str(),
+        reason: error.to_string(),
+    })
 }
 
 fn detect(

@@ -1,8 +1,8 @@
 //! Follows a graph from its start, or from now, to its end.
 
-use std::path::Path;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
+use vigil_cycle::domain::GraphStart;
 use vigil_cycle::{Clock, Monotonic, PortError, signal};
 use vigil_flight::LiveMessages;
 use vigil_setup::RunningGraph;
@@ -11,8 +11,6 @@ use vigil_timeline::EventReader;
 use crate::feeds::Feeds;
 use crate::network::{Network, NetworkError};
 
-/// Longest pause between two looks at the topics.
-const POLL_MAX: Duration = Duration::from_millis(50);
 /// Between two looks whether the graph runs, which cost system calls.
 const LIFE: Duration = Duration::from_secs(1);
 
@@ -41,16 +39,9 @@ impl Reason {
 /// Observes one run of a graph.
 pub struct Observer<'a> {
     running: &'a RunningGraph,
-    start: Option<SystemTime>,
+    start: Option<GraphStart>,
     feeds: Feeds,
     events: EventReader,
-}
-
-/// When the graph was started.
-fn start_time(list: &Path) -> Option<SystemTime> {
-    std::fs::metadata(list)
-        .and_then(|list| list.modified())
-        .ok()
 }
 
 impl<'a> Observer<'a> {
@@ -66,18 +57,10 @@ impl<'a> Observer<'a> {
         }
         Ok(Self {
             running,
-            start: start_time(&running.domain.processes_file()),
+            start: running.domain.start(),
             feeds: Feeds::open(&running.domain, all)?,
             events,
         })
-    }
-
-    /// Between two looks: half the time in which the shortest queue fills.
-    fn pause(&self) -> Duration {
-        let file = &self.running.setup.file;
-        let period = Duration::from_secs_f64(1.0 / file.graph.rate_hz);
-        let buffer = u32::try_from(file.transport.buffer).unwrap_or(2);
-        (period * buffer / 2).min(POLL_MAX)
     }
 
     /// Sends what the graph says until it ends, or this program is to stop.
@@ -89,7 +72,7 @@ impl<'a> Observer<'a> {
         messages: &mut LiveMessages,
         network: &Network,
     ) -> Result<Reason, NetworkError> {
-        let pause = self.pause();
+        let pause = self.running.setup.observer_pause();
         let mut looked = Instant::now();
         loop {
             if signal::stop_requested() {
@@ -105,7 +88,7 @@ impl<'a> Observer<'a> {
                 if !self.running.lives() {
                     return Ok(Reason::Ended);
                 }
-                if start_time(&self.running.domain.processes_file()) != self.start {
+                if self.running.domain.start() != self.start {
                     return Ok(Reason::Replaced);
                 }
             }

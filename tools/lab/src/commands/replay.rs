@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use vigil_cycle::topic::ServiceName;
-use vigil_replay::{Answer, Difference, Gap, Moment, Replay, Tally, What};
+use vigil_replay::{Answer, Difference, Moment, Replay, Tally, What};
 use vigil_setup::Setup;
 use vigil_terminal::{CommandError, Outcome, output};
 use vigil_timeline::unix_time_of_day;
@@ -108,8 +108,8 @@ struct Teller<'a> {
     alarm: Option<bool>,
     mode: Option<u32>,
     action: Option<u32>,
-    differences: Vec<Difference>,
-    gaps: Vec<Gap>,
+    differences: Vec<ListedDifference>,
+    gaps: Vec<ListedGap>,
 }
 
 /// Computes it.
@@ -164,13 +164,19 @@ impl Teller<'_> {
         let told = match what {
             What::Begins => Some(format!("{} begins to be computed", service.as_str())),
             What::Answered(answer, difference) => {
-                let told = difference.map(|difference| self.differs(difference));
+                let told = difference.map(|it| self.differs(t_ns, service, it));
                 told.or_else(|| self.change(setup, &answer))
             }
-            What::StateDiffers(difference) => Some(self.differs(difference)),
-            What::Gap(gap) => {
-                let told = format!("{}: gap: {}", service.as_str(), gap.what);
-                self.gaps.push(gap);
+            What::StateDiffers(difference) => Some(self.differs(t_ns, service, difference)),
+            What::Gap(what) => {
+                let told = format!("{}: gap: {what}", service.as_str());
+                if self.gaps.len() < LISTED_MAX {
+                    self.gaps.push(ListedGap {
+                        service: service.as_str(),
+                        t_unix_s: t_ns as f64 * 1e-9,
+                        what,
+                    });
+                }
                 Some(told)
             }
         };
@@ -205,19 +211,25 @@ impl Teller<'_> {
         }
     }
 
-    /// Keeps a difference, and says it once; further ones of the same service are many.
-    fn differs(&mut self, difference: Difference) -> String {
+    /// Keeps a difference, and says it.
+    fn differs(&mut self, t_ns: u64, service: ServiceName, it: Difference) -> String {
+        let service = service.as_str();
         let Difference {
-            service,
+            block,
             field,
             recorded,
             computed,
-            ..
-        } = &difference;
-        let service = service.as_str();
+        } = it;
         let told = format!("{service}: differs: {field}: recorded {recorded}, computed {computed}");
         if self.differences.len() < LISTED_MAX {
-            self.differences.push(difference);
+            self.differences.push(ListedDifference {
+                service,
+                t_unix_s: t_ns as f64 * 1e-9,
+                block_seq: block.seq,
+                field,
+                recorded,
+                computed,
+            });
         }
         told
     }
@@ -265,21 +277,8 @@ impl Teller<'_> {
         });
         let first_ns = self.first_ns.unwrap_or(self.last_ns);
         let recorded_s = (self.last_ns - first_ns) as f64 * 1e-9;
-        let unix_s = |t_ns: u64| t_ns as f64 * 1e-9;
-        self.differences.sort_by_key(|it| it.t_ns);
-        let differences = self.differences.into_iter().map(|it| ListedDifference {
-            service: it.service.as_str(),
-            t_unix_s: unix_s(it.t_ns),
-            block_seq: it.block.seq,
-            field: it.field,
-            recorded: it.recorded,
-            computed: it.computed,
-        });
-        let gaps = self.gaps.into_iter().map(|it| ListedGap {
-            service: it.service.as_str(),
-            t_unix_s: unix_s(it.t_ns),
-            what: it.what,
-        });
+        let differences = &mut self.differences;
+        differences.sort_by(|a, b| a.t_unix_s.total_cmp(&b.t_unix_s));
         let is_compared = |it: &ComparedService| it.compared > 0 || it.answers == 0;
         let answers: u64 = services.iter().map(|it| it.answers).sum();
         let is_whole = damaged.is_none() && answers > 0 && services.iter().all(is_compared);
@@ -294,8 +293,8 @@ impl Teller<'_> {
             damaged,
             foreign_blocks: replay.foreign_count(),
             services: services.into(),
-            differences: differences.collect(),
-            gaps: gaps.take(LISTED_MAX).collect(),
+            differences: self.differences,
+            gaps: self.gaps,
         }
     }
 }
