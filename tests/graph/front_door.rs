@@ -101,7 +101,8 @@ fn a_graph_that_hears_no_publisher_says_so_and_ends_with_1() {
 fn a_graph_whose_launcher_was_killed_is_listed_adopted_and_goes_on() {
     let _machine = machine();
     let name = unique("adopted");
-    let graph = orphan(&name, &["--inject", "encoder:LF:zero@1"]);
+    let inject = ["--inject", "encoder:LF:zero@1", "--inject", "stuck:RM@500"];
+    let graph = orphan(&name, &inject);
     let text = vigil(&["list"]);
     assert_eq!(text.status.code(), Some(1));
     let text = String::from_utf8_lossy(&text.stdout).into_owned();
@@ -142,7 +143,11 @@ fn a_graph_whose_launcher_was_killed_is_listed_adopted_and_goes_on() {
         .collect();
     assert!(times[0] > 0.9 && times[1] > times[0], "{times:?}");
     let restarted = listed(&name).unwrap();
-    assert_ne!(pids(&restarted)[0], pids(&graph)[0]);
+    let again = pids(&restarted)[0];
+    assert_ne!(again, pids(&graph)[0]);
+    // What is still to break breaks there, too.
+    let line = std::fs::read_to_string(format!("/proc/{again}/cmdline")).unwrap();
+    assert!(line.contains("stuck:RM@500"), "{line}");
 
     assert_eq!(vigil(&["stop", "--graph", &name]).status.code(), Some(0));
     let output = wait(launcher);

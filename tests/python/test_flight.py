@@ -151,6 +151,9 @@ class BlackBox(unittest.TestCase):
             second = wait_for(lambda: self.blackbox(graph) not in (None, first) and self.blackbox(graph), "another")
             self.assertNotEqual(second, first)
             path, *_ = wait_for(lambda: self.recordings("crash"), "a recording")
+            told = vigil("events", "--json", "--graph", graph.name).stdout.splitlines()
+            restarted = [event["service"] for event in map(json.loads, told) if event["event"] == "restarted"]
+            self.assertEqual(restarted, ["blackbox"])
             summary = graph.stop()
         times = [log_time for log_time, _ in Flight(path).messages["/joint_states"]]
         # To the last second before it was killed.

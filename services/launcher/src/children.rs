@@ -8,7 +8,7 @@ use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Domain, Monotonic, RunReport, signal};
 
-use crate::companion::Companion;
+use crate::companion::{Companion, CompanionNews};
 use crate::error::LauncherError;
 use crate::locks::Locks;
 use crate::observer::HealthObserver;
@@ -123,6 +123,7 @@ impl Children {
         self.list()?;
         let domain = &self.domain;
         std::fs::write(domain.document_file(), plan.document_text()?)?;
+        plan.options.leave(&domain.options_file())?;
         // First: a publisher that finds the graph may ask for them.
         plan.setup.border().tell_publishers(domain)?;
         let line = |s: &ServiceProcess| format!("{} {}\n", s.name.as_str(), s.process.id());
@@ -195,6 +196,11 @@ impl Children {
             let _ = self.list();
         }
         false
+    }
+
+    /// What has become of the black box since the last call.
+    pub fn take_blackbox_news(&mut self) -> Option<CompanionNews> {
+        self.blackbox.as_mut().and_then(Companion::take_news)
     }
 
     /// The services that have been restarted since the last call.

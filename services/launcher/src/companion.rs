@@ -20,6 +20,16 @@ pub struct Companion {
     process: Option<Process>,
     history: RestartHistory,
     restart_at: Option<Instant>,
+    /// What is still to be told of it.
+    news: Option<CompanionNews>,
+}
+
+/// What has become of the black box.
+pub enum CompanionNews {
+    /// Another process has taken its place.
+    Restarted,
+    /// It is gone for good.
+    GaveUp(String),
 }
 
 impl Companion {
@@ -29,6 +39,7 @@ impl Companion {
             process: found.map(Process::found),
             history: RestartHistory::new(plan.restart_policy()),
             restart_at: None,
+            news: None,
         };
         if companion.process.is_none() && plan.setup.file.blackbox.enabled {
             companion.spawn(plan, domain);
@@ -56,10 +67,10 @@ impl Companion {
                     tell!("vigil: the black box ended ({ending}); restarting");
                     self.restart_at = Some(now + delay);
                 }
-                Err(reason) => tell!(
-                    "vigil: the black box ended ({ending}); given up: {reason}; nothing is \
-                     recorded any more"
-                ),
+                Err(reason) => {
+                    let what = format!("{ending}; {reason}; nothing is recorded any more");
+                    self.news = Some(CompanionNews::GaveUp(what));
+                }
             }
         }
         let is_due = self.restart_at.is_some_and(|at| now >= at);
@@ -67,8 +78,14 @@ impl Companion {
             self.restart_at = None;
             self.history.restarted(now);
             self.spawn(plan, domain);
+            self.news = Some(CompanionNews::Restarted);
         }
         is_due
+    }
+
+    /// What has become of it since the last call.
+    pub const fn take_news(&mut self) -> Option<CompanionNews> {
+        self.news.take()
     }
 
     fn spawn(&mut self, plan: &Plan, domain: &Domain) {

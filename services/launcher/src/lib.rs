@@ -18,6 +18,7 @@ mod plan;
 mod process;
 mod restarts;
 mod run;
+mod start_options;
 mod summary;
 mod teller;
 mod waiting;

@@ -16,6 +16,7 @@ use vigil_setup::{Document, RunningGraph, Setup};
 use crate::args::LauncherArgs;
 use crate::error::LauncherError;
 use crate::restarts::RestartPolicy;
+use crate::start_options::StartOptions;
 
 /// Changes younger than this may not be in the timeline when a simulator dies, s: four intervals of
 /// Health, which goes out twenty times a second.
@@ -41,13 +42,6 @@ pub struct CommandLine {
     pub options: Vec<String>,
 }
 
-/// Where the instants of cycles are left, and of how many.
-#[derive(Debug, Clone)]
-struct StampsRequest {
-    folder: PathBuf,
-    cycles: usize,
-}
-
 /// A checked start.
 pub struct Plan {
     /// The configuration, options applied.
@@ -56,16 +50,15 @@ pub struct Plan {
     document: SealedText,
     /// Folder of the services' programs: the launcher's own.
     pub programs: PathBuf,
-    inject: Vec<String>,
-    stamps: Option<StampsRequest>,
-    no_timing: bool,
+    /// What the start asks beside the configuration.
+    pub options: StartOptions,
 }
 
 impl Plan {
     /// Reads and checks everything that the services will read; each of them checks its part.
     pub fn new(args: &LauncherArgs) -> Result<Self, LauncherError> {
         let plan = Self::read(args)?;
-        if let Some(StampsRequest { folder, .. }) = &plan.stamps {
+        if let Some(folder) = &plan.options.stamps {
             std::fs::create_dir_all(folder).map_err(|cause| LauncherError::file(folder, cause))?;
         }
         plan.check_services()?;
@@ -87,24 +80,25 @@ impl Plan {
             document.file.graph.rate_hz = playback_rate_hz(&setup)?;
             setup = document.check()?;
         }
-        let stamps = |folder: &PathBuf| StampsRequest {
-            folder: folder.clone(),
-            cycles: args.stamped_cycles,
-        };
-        Ok(Self {
-            inject: args.inject.clone(),
-            stamps: args.stamps.as_ref().map(stamps),
-            no_timing: args.no_timing,
-            ..Self::from_document(&document, setup)?
-        })
+        let stamps = args.stamps.as_deref().unwrap_or(Path::new("."));
+        let options =
+            StartOptions::new(args).map_err(|cause| LauncherError::file(stamps, cause))?;
+        Self::from_document(&document, setup, options)
     }
 
     /// What a running graph runs on, to look after it from now on.
     pub fn of_running(graph: &RunningGraph) -> Result<Self, LauncherError> {
-        Self::from_document(&graph.document, graph.setup.clone())
+        let file = graph.domain.options_file();
+        let options = StartOptions::read(&file);
+        let options = options.map_err(|cause| LauncherError::file(&file, cause))?;
+        Self::from_document(&graph.document, graph.setup.clone(), options)
     }
 
-    fn from_document(document: &Document, setup: Setup) -> Result<Self, LauncherError> {
+    fn from_document(
+        document: &Document,
+        setup: Setup,
+        options: StartOptions,
+    ) -> Result<Self, LauncherError> {
         let text = document.to_text()?;
         Ok(Self {
             document: SealedText::new(&text).map_err(LauncherError::Document)?,
@@ -112,9 +106,7 @@ impl Plan {
             programs: std::env::current_exe()
                 .unwrap_or_default()
                 .with_file_name(""),
-            inject: Vec::new(),
-            stamps: None,
-            no_timing: false,
+            options,
         })
     }
 
@@ -153,10 +145,11 @@ impl Plan {
     /// Options that say what a service is to record of its cycles.
     fn recording(&self, name: ServiceName, report: &Path) -> Vec<String> {
         let mut options = vec!["--report".into(), report.display().to_string()];
-        if self.no_timing {
+        if self.options.no_timing {
             options.push("--no-timing".into());
         }
-        if let Some(StampsRequest { folder, cycles }) = &self.stamps {
+        if let Some(folder) = &self.options.stamps {
+            let cycles = self.options.stamped_cycles;
             let file = folder.join(format!("{}.stamps", name.as_str()));
             options.extend(["--stamps".into(), file.display().to_string()]);
             options.extend(["--stamped-cycles".into(), cycles.to_string()]);
@@ -240,7 +233,7 @@ impl Plan {
     /// What is to be broken from the start on; only the simulator can be.
     fn injections(&self, name: ServiceName) -> Vec<String> {
         match name {
-            ServiceName::SensorSim => self.inject.clone(),
+            ServiceName::SensorSim => self.options.inject.clone(),
             _ => Vec::new(),
         }
     }
@@ -259,7 +252,7 @@ impl Plan {
                     && !drive.changes.iter().filter_map(parse).any(is_same)
             })
         };
-        let to_come = self.inject.iter().filter(is_to_come);
+        let to_come = self.options.inject.iter().filter(is_to_come);
         to_come.chain(&drive.changes).cloned().collect()
     }
 
@@ -318,10 +311,10 @@ pub(crate) mod tests {
 
     #[test]
     fn what_services_are_to_record_is_in_their_options() {
-        let plan = plan(&["--stamps", "d", "--stamped-cycles", "9", "--no-timing"]).unwrap();
+        let plan = plan(&["--stamps", "/d", "--stamped-cycles", "9", "--no-timing"]).unwrap();
         assert_eq!(
             options(plan.command(ServiceName::Supervisor, Path::new("r"))),
-            "--report r --no-timing --stamps d/supervisor.stamps --stamped-cycles 9"
+            "--report r --no-timing --stamps /d/supervisor.stamps --stamped-cycles 9"
         );
     }
 

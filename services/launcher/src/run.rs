@@ -11,7 +11,7 @@ use vigil_timeline::{EventWriter, TimelineEntry, WallClock};
 
 use crate::args::LauncherArgs;
 use crate::children::Children;
-use crate::companion;
+use crate::companion::{self, CompanionNews};
 use crate::error::LauncherError;
 use crate::locks::{Claim, Locks};
 use crate::observer::{HealthObserver, ServiceView};
@@ -164,7 +164,8 @@ impl OwnGraph {
         }
         let mut teller = Teller::new(&domain.events_file(), !args.json);
         if args.adopt {
-            teller.tell(&adoption(&observer));
+            let what = "the launcher before was gone";
+            teller.tell(&own_entry(&observer, "launcher", "adopted", what));
         }
         let mut watch = Watch {
             args,
@@ -198,16 +199,16 @@ impl OwnGraph {
     }
 }
 
-/// That this launcher looks after the graph from now on.
-fn adoption(observer: &HealthObserver) -> TimelineEntry {
+/// What no service says of itself.
+fn own_entry(observer: &HealthObserver, who: &str, event: &str, what: &str) -> TimelineEntry {
     let t_ns = Monotonic.now_ns();
     TimelineEntry {
         t_s: observer.since_ready_s(),
         t_ns,
         wall: WallClock::now().rfc3339(t_ns),
-        service: "launcher".to_owned(),
-        event: "adopted".to_owned(),
-        what: "the launcher before was gone".to_owned(),
+        service: who.to_owned(),
+        event: event.to_owned(),
+        what: what.to_owned(),
         ..TimelineEntry::default()
     }
 }
@@ -286,6 +287,7 @@ impl Watch<'_> {
             if children.look_after(plan, observer) {
                 return EndReason::GaveUp;
             }
+            self.tell_of_blackbox(observer, children);
             watchdog.look_after(observer, children);
             let Some(lasted_s) = observer.since_ready_s() else {
                 if self.has_waited_enough(&waiting) {
@@ -307,6 +309,16 @@ impl Watch<'_> {
         let new = observer.timeline.take_new(waiting.is_long());
         new.iter().for_each(|entry| self.teller.tell(entry));
         self.teller.tell_misses(Monotonic.now_ns());
+    }
+
+    fn tell_of_blackbox(&mut self, observer: &HealthObserver, children: &mut Children) {
+        let (event, what) = match children.take_blackbox_news() {
+            Some(CompanionNews::Restarted) => ("restarted", String::new()),
+            Some(CompanionNews::GaveUp(what)) => ("gave up", what),
+            None => return,
+        };
+        self.teller
+            .tell(&own_entry(observer, "blackbox", event, &what));
     }
 
     /// True, and said, if no action has come in time.

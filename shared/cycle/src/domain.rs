@@ -149,6 +149,13 @@ impl Domain {
         self.folder.join("document")
     }
 
+    /// File with what the start asked of the services beside the configuration, for a launcher that
+    /// adopts the graph.
+    #[must_use]
+    pub fn options_file(&self) -> PathBuf {
+        self.folder.join("options")
+    }
+
     /// File to which the launcher writes what happens.
     #[must_use]
     pub fn events_file(&self) -> PathBuf {
@@ -315,6 +322,7 @@ impl Domain {
             self.start_file(),
             self.faults_file(),
             self.document_file(),
+            self.options_file(),
             self.request_file(),
             self.recordings_file(),
             self.ring_file(),
@@ -412,6 +420,7 @@ mod tests {
             domain.addresses_file(),
             domain.start_file(),
             domain.document_file(),
+            domain.options_file(),
             domain.events_file(),
             domain.launcher_file(),
             domain.failure_file(ServiceName::Detector),

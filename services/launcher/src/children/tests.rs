@@ -12,6 +12,7 @@ use vigil_cycle::watchdog::Settings;
 use super::*;
 use crate::locks::Claim;
 use crate::plan::tests::plan;
+use crate::start_options::StartOptions;
 use crate::watchdog::WatchdogDriver;
 
 const SLEEPING_SERVICE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/sleeping-service");
@@ -181,6 +182,7 @@ fn a_service_that_never_reports_is_ended_by_the_watchdog_and_started_again() {
 #[test]
 fn services_of_a_launcher_that_is_gone_are_adopted_restarted_and_stopped() {
     let mut graph = SleepingGraph::new("adopted");
+    graph.plan.options.inject = vec!["stuck:RM@500".to_owned()];
     let mut children = graph.start();
     let started: Vec<u32> = children.services.iter().map(|s| s.process.id()).collect();
     assert!(matches!(Claim::take(&graph.domain).unwrap(), Claim::Held));
@@ -190,6 +192,8 @@ fn services_of_a_launcher_that_is_gone_are_adopted_restarted_and_stopped() {
     let Claim::Orphaned(locks) = Claim::take(&graph.domain).unwrap() else {
         panic!("the services hold the graph's lock");
     };
+    let left = StartOptions::read(&graph.domain.options_file()).unwrap();
+    assert_eq!(left, graph.plan.options);
     let children = Children::adopt(&graph.plan, &graph.domain, &mut graph.observer, locks);
     let mut children = children.unwrap();
     let adopted: Vec<u32> = children.services.iter().map(|s| s.process.id()).collect();
