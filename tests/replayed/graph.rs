@@ -6,14 +6,15 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{
-    Action, CheckpointPart, DetectionBelief, FaultBelief, Journal, ParticleBlock, SensorFrame,
+    Action, CheckpointPart, Control, ControlCommand, DetectionBelief, FaultBelief, Faults, Journal,
+    ParticleBlock, SensorFrame,
 };
 use vigil_cycle::placement::{PlacementRequest, read_back};
 use vigil_cycle::port::{Bus, TopicBlock};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    CycleAccount, DeadlineMonitor, Graph, HealthBoard, Receiver, Recorder, Sender, SourceCycle,
-    Stage, StageCycle, Stamp, Topic, VirtualClock,
+    CycleAccount, DeadlineMonitor, Graph, HealthBoard, KeptBlock, Receiver, Recorder, Sender,
+    SourceCycle, Stage, StageCycle, Stamp, Topic, VirtualClock,
 };
 use vigil_detector::DetectorStage;
 use vigil_flight::FlightWriter;
@@ -21,7 +22,7 @@ use vigil_identifier::IdentifierStage;
 use vigil_sensor_sim::{SensorSource, SimulatorSource};
 use vigil_setup::graph_file::GraphFile;
 use vigil_setup::{Document, GraphArgs, Setup};
-use vigil_supervisor::{FaultBoard, SupervisorStage};
+use vigil_supervisor::{FaultBoard, Steps, SupervisorStage};
 use vigil_timeline::WallClock;
 
 /// What is recorded, and how it runs.
@@ -69,6 +70,8 @@ struct Feeds {
     particles: Feed<ParticleBlock>,
     diagnoses: Feed<FaultBelief>,
     actions: Feed<Action>,
+    faults: Feed<Faults>,
+    orders: Feed<Control>,
     journals: [Feed<Journal>; 3],
     checkpoints: [Feed<CheckpointPart>; 3],
 }
@@ -82,6 +85,8 @@ impl Feeds {
             particles: Feed::new(graph, Topic::DetectionParticles),
             diagnoses: Feed::new(graph, Topic::Diagnosis),
             actions: Feed::new(graph, Topic::Action),
+            faults: Feed::new(graph, Topic::Faults),
+            orders: Feed::new(graph, Topic::Control(ServiceName::Supervisor)),
             journals: services.map(|service| Feed::new(graph, Topic::Journal(service))),
             checkpoints: services.map(|service| Feed::new(graph, Topic::Checkpoint(service))),
         }
@@ -97,6 +102,8 @@ impl Feeds {
         self.detections.drain(flight);
         self.diagnoses.drain(flight);
         self.actions.drain(flight);
+        self.faults.drain(flight);
+        self.orders.drain(flight);
         // Recordings have few of them, and a replay needs none.
         self.particles.drain(&mut None);
     }
@@ -229,13 +236,9 @@ struct Stages {
 }
 
 impl Stages {
-    fn new(setup: &Setup, graph: &Graph, clock: &VirtualClock) -> Self {
+    fn new(setup: &Setup, graph: &Graph, kept: &Path, clock: &VirtualClock) -> Self {
         let step = vigil_identifier::assemble(setup).unwrap();
         let identifier = IdentifierStage::new(step, &setup.robot, graph).unwrap();
-        let step = vigil_supervisor::assemble(setup).unwrap();
-        let life = vigil_supervisor::fault_life(setup).unwrap();
-        let board = FaultBoard::new(life, setup.tree.hash(), graph, None).unwrap();
-        let validity_ns = vigil_supervisor::validity_ns(setup);
         let mut cycles = ServiceName::STEPPING.map(|name| stage(setup, graph, name));
         for cycle in &mut cycles {
             cycle.account_mut().ready(clock).unwrap();
@@ -244,7 +247,7 @@ impl Stages {
             cycles,
             detector: detector(setup, graph),
             identifier,
-            supervisor: SupervisorStage::new(step, board, graph, validity_ns).unwrap(),
+            supervisor: supervisor(setup, graph, kept, clock),
         }
     }
 
@@ -253,6 +256,19 @@ impl Stages {
         self.detector = detector(setup, graph);
         self.cycles[0] = stage(setup, graph, ServiceName::Detector);
         self.cycles[0].account_mut().ready(clock).unwrap();
+    }
+
+    /// The supervisor is a new process.
+    fn restart_supervisor(
+        &mut self,
+        setup: &Setup,
+        graph: &Graph,
+        kept: &Path,
+        clock: &VirtualClock,
+    ) {
+        self.supervisor = supervisor(setup, graph, kept, clock);
+        self.cycles[2] = stage(setup, graph, ServiceName::Supervisor);
+        self.cycles[2].account_mut().ready(clock).unwrap();
     }
 
     fn turn(&mut self, k: u64, hiccup: Hiccup, clock: &VirtualClock) {
@@ -276,6 +292,30 @@ fn detector(setup: &Setup, graph: &Graph) -> DetectorStage {
     DetectorStage::new(step, &setup.robot, graph).unwrap()
 }
 
+/// Keeps its faults in a file.
+fn supervisor(setup: &Setup, graph: &Graph, kept: &Path, clock: &VirtualClock) -> SupervisorStage {
+    let mut steps = Steps {
+        supervisor: vigil_supervisor::assemble(setup).unwrap(),
+        faults: vigil_supervisor::fault_step(setup).unwrap(),
+    };
+    let kept = KeptBlock::open(kept).unwrap();
+    let board = FaultBoard::new(&mut steps.faults, graph, Some(kept), clock).unwrap();
+    let validity_ns = vigil_supervisor::validity_ns(setup);
+    SupervisorStage::new(steps, board, graph, validity_ns).unwrap()
+}
+
+/// An operator acknowledges all faults.
+fn acknowledge(graph: &Graph, clock: &VirtualClock, t_ns: u64) {
+    let topic = Topic::Control(ServiceName::Supervisor);
+    let mut orders = graph.sender::<Control>(topic).unwrap();
+    orders.block().command = ControlCommand::Acknowledge as u32;
+    let stamp = Stamp {
+        t_schedule_ns: t_ns,
+        t_capture_ns: t_ns,
+    };
+    orders.send(stamp, clock).unwrap();
+}
+
 /// Runs the graph, and writes what it publishes.
 pub fn record(drive: &Drive, path: &Path) {
     let text = document(drive).to_text().unwrap();
@@ -286,7 +326,8 @@ pub fn record(drive: &Drive, path: &Path) {
     let mut feeds = Feeds::new(&graph);
     let mut publisher = Publisher::new(&setup, &graph, drive.inject);
     clock.set(period_ns);
-    let mut stages = Stages::new(&setup, &graph, &clock);
+    let kept = path.with_extension("faults");
+    let mut stages = Stages::new(&setup, &graph, &kept, &clock);
     let mut flight = None;
     for k in 1..=drive.cycles {
         if k > drive.unrecorded && flight.is_none() {
@@ -304,6 +345,10 @@ pub fn record(drive: &Drive, path: &Path) {
             Hiccup::Refused => publisher.spoil(&graph, &clock, t_ns),
             Hiccup::Renewed => publisher.renew(&graph),
             Hiccup::Restarted => stages.restart_detector(&setup, &graph, &clock),
+            Hiccup::SupervisorRestarted => {
+                stages.restart_supervisor(&setup, &graph, &kept, &clock);
+            }
+            Hiccup::Acknowledged => acknowledge(&graph, &clock, t_ns),
             _ => {}
         }
         if !matches!(hiccup, Hiccup::Silent | Hiccup::Refused) {
@@ -338,6 +383,10 @@ pub enum Hiccup {
     Renewed,
     /// The detector is a new process.
     Restarted,
+    /// The supervisor is a new process.
+    SupervisorRestarted,
+    /// An operator knows of all faults.
+    Acknowledged,
 }
 
 /// What may happen at any time.

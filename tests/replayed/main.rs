@@ -6,7 +6,7 @@ mod graph;
 
 use std::path::Path;
 
-use vigil_blocks::FaultBelief;
+use vigil_blocks::{FaultBelief, FaultRecord, FaultState, Faults};
 use vigil_cycle::Topic;
 use vigil_cycle::topic::ServiceName;
 use vigil_flight::{FlightReader, FlightWriter, Recorded};
@@ -36,8 +36,8 @@ struct Replayed {
     tallies: [Tally; 3],
     first_difference: Option<(ServiceName, Difference)>,
     gaps: Vec<String>,
-    /// True if an alarm, a fault's name and another action were computed.
-    had_a_fault: [bool; 3],
+    /// True if an alarm, a fault's name, another action and an active fault were computed.
+    had_a_fault: [bool; 4],
 }
 
 fn recorded(drive: &Drive) -> Replayed {
@@ -49,7 +49,7 @@ fn recorded(drive: &Drive) -> Replayed {
 
 fn replay(path: &Path) -> Replayed {
     let mut replay = Replay::open(path).unwrap();
-    let (mut first_difference, mut gaps, mut had_a_fault) = (None, Vec::new(), [false; 3]);
+    let (mut first_difference, mut gaps, mut had_a_fault) = (None, Vec::new(), [false; 4]);
     while let Some(moment) = replay.next_moment().unwrap() {
         match moment.what {
             What::Answered(answer, difference) => {
@@ -60,6 +60,10 @@ fn replay(path: &Path) -> Replayed {
                     vigil_replay::Answer::Diagnosis(belief) => had_a_fault[1] |= belief.mode != 0,
                     vigil_replay::Answer::Action(action) => {
                         had_a_fault[2] |= action.decision_seq > 1
+                    }
+                    vigil_replay::Answer::Faults(faults) => {
+                        let active = |it: &FaultRecord| it.state() == Some(FaultState::Active);
+                        had_a_fault[3] |= faults.kept().any(active);
                     }
                 }
             }
@@ -95,7 +99,7 @@ fn a_drive_with_two_faults_is_computed_again_from_its_start() {
     demand_identical("rover", &ROVER);
     let replayed = recorded(&ROVER);
     assert_eq!(
-        replayed.had_a_fault, [true; 3],
+        replayed.had_a_fault, [true; 4],
         "there was something to compute"
     );
 }
@@ -213,7 +217,7 @@ fn demand_same_from_a_state(name: &str, drive: &Drive) {
     assert_eq!(replayed.first_difference, None, "{name}");
     assert_eq!(replayed.gaps, Vec::<String>::new(), "{name}");
     // Not every filter finds a name.
-    let [alarm, _, action] = replayed.had_a_fault;
+    let [alarm, _, action, _] = replayed.had_a_fault;
     assert!(alarm && action, "{name}: something to compute");
     for tally in replayed.tallies {
         let is_there = tally.compared > 1000 && tally.states > 0 && tally.begun == 1;
@@ -248,6 +252,8 @@ fn restarts_a_new_publisher_and_blindness_are_computed_again() {
         700..=830 => Hiccup::Silent,
         1300 | 1900 => Hiccup::Renewed,
         1600 => Hiccup::Restarted,
+        2000 => Hiccup::SupervisorRestarted,
+        2300 => Hiccup::Acknowledged,
         _ => now_and_then(k),
     };
     for config in ["rover.toml", "kobuki.toml"] {
@@ -260,7 +266,7 @@ fn restarts_a_new_publisher_and_blindness_are_computed_again() {
         assert_eq!(replayed.first_difference, None, "{config}");
         assert_eq!(replayed.gaps, Vec::<String>::new(), "{config}");
         let begun = replayed.tallies.map(|tally| tally.begun);
-        assert_eq!(begun, [2, 1, 1], "{config}");
+        assert_eq!(begun, [2, 1, 2], "{config}");
     }
 }
 
@@ -330,6 +336,23 @@ fn a_bit_that_is_not_the_same_is_named() {
 }
 
 #[test]
+fn a_fault_that_is_not_the_same_is_named() {
+    let mut is_changed = false;
+    let replayed = altered(|topic, bytes| {
+        let at = std::mem::offset_of!(Faults, records) + std::mem::offset_of!(FaultRecord, p);
+        if topic == Topic::Faults && !is_changed && bytes[at + 7] != 0 {
+            bytes[at] ^= 1;
+            is_changed = true;
+        }
+        true
+    });
+    let (service, difference) = replayed.first_difference.unwrap();
+    let named = (service, difference.field.as_str());
+    assert_eq!(named, (ServiceName::Supervisor, "records[0].p"));
+    assert_eq!(replayed.tallies.map(|tally| tally.different), [0, 0, 1]);
+}
+
+#[test]
 fn what_was_not_recorded_is_named_and_the_services_go_on_from_their_next_state() {
     let mut count = 0;
     let replayed = altered(|topic, _| {
@@ -340,9 +363,11 @@ fn what_was_not_recorded_is_named_and_the_services_go_on_from_their_next_state()
     let gaps = [
         "detector: a sensor frame was not recorded",
         "identifier: the detector's hypotheses are not known",
+        // It may be what is measured when a fault begins.
+        "supervisor: a sensor frame was not recorded",
     ];
     assert_eq!(replayed.gaps, gaps);
-    for tally in &replayed.tallies[..2] {
+    for tally in replayed.tallies {
         assert!(
             tally.begun == 2 && tally.compared < tally.answers,
             "{tally:?}"

@@ -31,11 +31,11 @@ struct ToldFaults {
 
 impl ToldFaults {
     fn take(&mut self, t_s: f64, stages: &Stages) {
+        let is_armed = stages.detection().readiness == Readiness::Armed as u32;
         self.life.step(LifeInput {
             now_ns: (t_s * 1e9) as u64,
-            diagnosis: Some(stages.diagnosis()),
+            observed: Some(stages.diagnosis()).filter(|_| is_armed),
             decided: stages.action().into(),
-            observes: stages.detection().readiness == Readiness::Armed as u32,
             silent_services: 0,
         });
         while let Some(record) = self.life.take_change() {

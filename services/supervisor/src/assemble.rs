@@ -4,6 +4,8 @@ use vigil_setup::Setup;
 
 use vigil_decision::{Compensation, FaultLife, FaultRuleError, Supervisor, SupervisorError};
 
+use crate::steps::FaultStep;
+
 /// Without any belief the robot stops after this long, ns. Chosen by hand: two observations, in
 /// which a robot of 0.2 m/s drives 2 cm.
 const BLIND_NS: u64 = 100_000_000;
@@ -46,6 +48,14 @@ pub fn assemble(setup: &Setup) -> Result<Supervisor, SupervisorError> {
 /// [`FaultRuleError`] for a rule about what does not exist.
 pub fn fault_life(setup: &Setup) -> Result<FaultLife, FaultRuleError> {
     FaultLife::new(&setup.file.faults, &setup.tree)
+}
+
+/// The same, fed with what the supervisor takes.
+///
+/// # Errors
+/// As [`fault_life`].
+pub fn fault_step(setup: &Setup) -> Result<FaultStep, FaultRuleError> {
+    Ok(FaultStep::new(fault_life(setup)?, setup.tree.hash()))
 }
 
 /// How long an action stays valid, ns: long enough to survive a few lost cycles, short enough to

@@ -1,40 +1,35 @@
 //! The faults' life at its ports: frames, decisions and operators' orders in, the block out.
 
 use vigil_blocks::{
-    Action, Block, Control, ControlCommand, EventKind, FaultBelief, FaultRecord, Faults, Health,
-    Readiness, SensorFrame,
+    Block, BlockId, Control, EventKind, FaultRecord, Faults, Health, JournalEntry, JournalKind,
+    SensorFrame,
 };
 use vigil_cycle::health::HEALTH_PERIOD_NS;
 use vigil_cycle::{
-    Clock, Graph, HealthBoard, KeptBlock, PortError, Receiver, Sender, Stamp, Topic,
+    Clock, Graph, HealthBoard, JournalWriter, KeptBlock, PortError, Receiver, Sender, Stamp, Topic,
     topic::ServiceName,
 };
-use vigil_decision::{CycleDecision, FaultLife, LifeInput, LifeOrder};
+
+use crate::steps::FaultStep;
 
 /// Longest time between two blocks, ns: a reader takes the supervisor for gone after a few.
 const INTERVAL_NS: u64 = 100_000_000;
 /// A service whose Health is older than this is silent, ns: five of its intervals.
 const SILENCE_NS: u64 = 5 * HEALTH_PERIOD_NS;
 
-/// Keeps the faults, publishes them, and has them ready for a supervisor that replaces this one.
+/// The ports of the faults' life. It keeps the faults for a supervisor that replaces this one.
 pub struct FaultBoard {
-    life: FaultLife,
-    tree_hash: u64,
     frames: Box<dyn Receiver<SensorFrame>>,
     orders: Box<dyn Receiver<Control>>,
     peers: [PeerHealth; 3],
     faults: Box<dyn Sender<Faults>>,
-    /// Where it is kept; nowhere in process.
+    /// Where they are kept; nowhere in process.
     kept: Option<KeptBlock<Faults>>,
-    /// Allocated once.
-    diagnosis: Box<FaultBelief>,
-    is_diagnosed: bool,
-    /// A diagnosis of this turn says something of the robot.
-    observes: bool,
-    decided: CycleDecision,
+    /// The block that says what an earlier supervisor has left.
+    restored: Option<BlockId>,
     published_ns: Option<u64>,
     revision_published: u64,
-    /// Why it could not be published, until the stage can say so.
+    /// Why they could not be published, until the stage can say so.
     failed: Option<PortError>,
 }
 
@@ -77,81 +72,72 @@ impl Clock for Instant {
 }
 
 impl FaultBoard {
-    /// Opens the ports on `graph`. What another has kept in `kept` goes on.
+    /// Opens the ports on `graph`. What another has left in `kept` goes on in `step`, and is
+    /// published again.
     ///
     /// # Errors
     /// The transport's.
     pub fn new(
-        mut life: FaultLife,
-        tree_hash: u64,
+        step: &mut FaultStep,
         graph: &Graph,
         kept: Option<KeptBlock<Faults>>,
+        clock: &dyn Clock,
     ) -> Result<Self, PortError> {
-        let left = kept.as_ref().and_then(KeptBlock::read);
-        if let Some(left) = left.filter(|it| it.tree_hash == tree_hash) {
-            life.restore(&left);
-        }
         use ServiceName::{Detector, Identifier, SensorSim, Supervisor};
         let peer = |service| PeerHealth::new(service, graph);
-        Ok(Self {
-            life,
-            tree_hash,
+        let left = kept.as_ref().and_then(KeptBlock::read);
+        let is_restored = left.is_some_and(|left| step.restore(&left));
+        let mut board = Self {
             frames: graph.receiver(Topic::Sensor)?,
             orders: graph.receiver(Topic::Control(Supervisor))?,
             peers: [peer(SensorSim)?, peer(Detector)?, peer(Identifier)?],
             faults: graph.sender(Topic::Faults)?,
             kept,
-            diagnosis: Box::default(),
-            is_diagnosed: false,
-            observes: false,
+            restored: None,
             failed: None,
-            decided: CycleDecision::default(),
             published_ns: None,
             revision_published: 0,
-        })
-    }
-
-    /// Keeps a diagnosis, by a detector that says whether an alarm could rise. One of another fault
-    /// tree is none.
-    pub(crate) fn take(&mut self, diagnosis: &FaultBelief, readiness: u32) {
-        if diagnosis.tree_hash == self.tree_hash {
-            *self.diagnosis = *diagnosis;
-            self.is_diagnosed = true;
-            self.observes = readiness == Readiness::Armed as u32;
+        };
+        if is_restored {
+            board.restored = Some(board.send(step, clock.now_ns())?);
         }
+        Ok(board)
     }
 
-    /// Keeps what was decided.
-    pub(crate) fn decide(&mut self, action: &Action) {
-        self.decided = action.into();
+    /// The block that says what an earlier supervisor has left, if one has.
+    pub(crate) const fn restored(&self) -> Option<BlockId> {
+        self.restored
     }
 
     /// Lets the faults live for a turn, whatever it was, and tells what has changed. What fails is
     /// told by [`Self::failure`].
-    pub(crate) fn turn(&mut self, health: &mut HealthBoard, now_ns: u64) {
+    pub(crate) fn turn(
+        &mut self,
+        step: &mut FaultStep,
+        journal: &mut JournalWriter,
+        health: &mut HealthBoard,
+        now_ns: u64,
+    ) {
         for _ in 0..self.frames.buffer() {
             let Some(frame) = self.frames.take_next() else {
                 break;
             };
             if frame.header.schema == SensorFrame::SCHEMA {
-                self.life.see(frame);
+                let entry = JournalEntry::new(JournalKind::Kept, 1);
+                journal.note(entry.with_input(frame.header.id()));
+                step.keep(frame);
             }
         }
         let silent = self.peers.iter_mut().map(|peer| peer.silent(now_ns));
         let silent_services = silent.fold(0, |all, bit| all | bit);
-        self.life.step(LifeInput {
-            now_ns,
-            diagnosis: self.is_diagnosed.then_some(&*self.diagnosis),
-            decided: self.decided,
-            observes: std::mem::take(&mut self.observes) && self.decided.blind == 0,
-            silent_services,
-        });
-        self.obey(health, now_ns);
-        while let Some(record) = self.life.take_change() {
+        journal.note(JournalEntry::new(JournalKind::Lived, silent_services).at(now_ns));
+        step.live(now_ns, silent_services);
+        self.obey(step, journal, health, now_ns);
+        while let Some(record) = step.take_change() {
             let (what, value) = event(record);
             health.event(now_ns, EventKind::Fault, what, record.p, value);
         }
-        self.failed = self.publish(now_ns).err();
+        self.failed = self.publish(step, journal, now_ns).err();
     }
 
     /// Why the last block could not be published, once.
@@ -160,28 +146,53 @@ impl FaultBoard {
     }
 
     /// Carries out what operators ask for.
-    fn obey(&mut self, health: &mut HealthBoard, now_ns: u64) {
+    fn obey(
+        &mut self,
+        step: &mut FaultStep,
+        journal: &mut JournalWriter,
+        health: &mut HealthBoard,
+        now_ns: u64,
+    ) {
         for _ in 0..self.orders.buffer() {
-            let Some(control) = self.orders.take_next().copied() else {
+            let Some(control) = self.orders.take_next() else {
                 break;
             };
-            let order = order(&control).filter(|_| control.header.schema == Control::SCHEMA);
-            let is_done = order.is_some_and(|order| self.life.obey(order, now_ns));
-            health.answer_control(control.header.epoch, control.header.seq, is_done);
+            let (id, command) = (control.header.id(), control.command);
+            let is_ours = control.header.schema == Control::SCHEMA;
+            let is_done = is_ours && step.obey(control, now_ns);
+            if is_ours {
+                let entry = JournalEntry::new(JournalKind::Ordered, 1);
+                journal.note(entry.with_input(id).at(now_ns));
+            }
+            health.answer_control(id.epoch, id.seq, is_done);
             if !is_done {
-                health.event(now_ns, EventKind::Refused, control.command, 0.0, 0);
+                health.event(now_ns, EventKind::Refused, command, 0.0, 0);
             }
         }
     }
 
-    fn publish(&mut self, now_ns: u64) -> Result<(), PortError> {
-        let is_changed = self.life.revision() != self.revision_published;
+    fn publish(
+        &mut self,
+        step: &FaultStep,
+        journal: &mut JournalWriter,
+        now_ns: u64,
+    ) -> Result<(), PortError> {
+        let is_changed = step.revision() != self.revision_published;
         let passed_ns = self.published_ns.map(|at_ns| now_ns.saturating_sub(at_ns));
         if !is_changed && passed_ns.is_some_and(|passed_ns| passed_ns < INTERVAL_NS) {
             return Ok(());
         }
+        let id = self.send(step, now_ns)?;
+        journal.note(JournalEntry::new(JournalKind::Told, 1).with_input(id));
+        Ok(())
+    }
+
+    /// Publishes the faults, and keeps them if they are others than before.
+    fn send(&mut self, step: &FaultStep, now_ns: u64) -> Result<BlockId, PortError> {
+        let (epoch, seq) = (self.faults.epoch(), self.faults.next_seq());
+        let is_changed = step.revision() != self.revision_published;
         let block = self.faults.block();
-        self.life.write(block, self.tree_hash);
+        step.write(block);
         if let Some(kept) = self.kept.as_mut().filter(|_| is_changed) {
             kept.write(block);
         }
@@ -190,19 +201,8 @@ impl FaultBoard {
             t_capture_ns: now_ns,
         };
         self.faults.send(stamp, &Instant(now_ns))?;
-        (self.published_ns, self.revision_published) = (Some(now_ns), self.life.revision());
-        Ok(())
-    }
-}
-
-/// What an operator asks for, if it is for the supervisor.
-fn order(control: &Control) -> Option<LifeOrder> {
-    let is = |command: ControlCommand| control.command == command as u32;
-    let acknowledge = LifeOrder::Acknowledge(u64::from(control.fault));
-    match () {
-        () if is(ControlCommand::Acknowledge) => Some(acknowledge),
-        () if is(ControlCommand::Forget) => Some(LifeOrder::Clear),
-        () => None,
+        (self.published_ns, self.revision_published) = (Some(now_ns), step.revision());
+        Ok(BlockId { epoch, seq })
     }
 }
 

@@ -2,8 +2,10 @@
 
 mod assemble;
 mod fault_board;
+mod steps;
 mod wiring;
 
-pub use assemble::{assemble, fault_life, validity_ns};
+pub use assemble::{assemble, fault_life, fault_step, validity_ns};
 pub use fault_board::FaultBoard;
+pub use steps::{FaultStep, Steps};
 pub use wiring::SupervisorStage;

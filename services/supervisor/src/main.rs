@@ -8,10 +8,9 @@ use clap::Parser;
 use vigil_blocks::FaultBelief;
 use vigil_cycle::serve;
 use vigil_cycle::topic::ServiceName;
-use vigil_cycle::{KeptBlock, Topic};
-use vigil_decision::{FaultLife, Supervisor};
+use vigil_cycle::{KeptBlock, Monotonic, Topic};
 use vigil_setup::{ServiceArgs, Setup};
-use vigil_supervisor::{FaultBoard, SupervisorStage, assemble, fault_life, validity_ns};
+use vigil_supervisor::{FaultBoard, Steps, SupervisorStage, assemble, fault_step, validity_ns};
 
 /// Decides what to do about a fault.
 #[derive(Debug, Parser)]
@@ -26,23 +25,25 @@ fn main() -> ExitCode {
     serve::process(
         ServiceName::Supervisor,
         args.check,
-        || args.prepare(parts),
-        |(setup, (supervisor, life))| {
+        || args.prepare(steps),
+        |(setup, mut steps)| {
             let plan = setup.plan(ServiceName::Supervisor, args.leave());
             serve::stage::<FaultBelief, _>(&plan, Topic::Diagnosis, |graph| {
                 let file = setup.domain()?.faults_file();
                 // Without it a supervisor that replaces this one begins without faults.
                 let kept = KeptBlock::open(&file)
                     .inspect_err(|error| eprintln!("supervisor: {}: {error}", file.display()));
-                let board = FaultBoard::new(life, setup.tree.hash(), graph, kept.ok())?;
+                let board = FaultBoard::new(&mut steps.faults, graph, kept.ok(), &Monotonic)?;
                 let valid_ns = validity_ns(&setup);
-                Ok(SupervisorStage::new(supervisor, board, graph, valid_ns)?)
+                Ok(SupervisorStage::new(steps, board, graph, valid_ns)?)
             })
         },
     )
 }
 
-/// What decides, and what keeps the faults.
-fn parts(setup: &Setup) -> Result<(Supervisor, FaultLife), Box<dyn Error>> {
-    Ok((assemble(setup)?, fault_life(setup)?))
+fn steps(setup: &Setup) -> Result<Steps, Box<dyn Error>> {
+    Ok(Steps {
+        supervisor: assemble(setup)?,
+        faults: fault_step(setup)?,
+    })
 }

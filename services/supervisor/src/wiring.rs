@@ -10,13 +10,14 @@ use vigil_cycle::{
     Stage, Stamp, Topic,
 };
 
-use vigil_decision::{Inputs, Supervisor};
+use vigil_decision::Inputs;
 
 use crate::fault_board::FaultBoard;
+use crate::steps::Steps;
 
 /// The supervisor as a stage of the graph: diagnoses and detections in, actions out.
 pub struct SupervisorStage {
-    supervisor: Supervisor,
+    steps: Steps,
     diagnoses: Box<dyn Receiver<FaultBelief>>,
     detections: Box<dyn Receiver<DetectionBelief>>,
     detection_account: InputAccount,
@@ -71,13 +72,17 @@ impl SupervisorStage {
     /// # Errors
     /// The transport's.
     pub fn new(
-        supervisor: Supervisor,
+        steps: Steps,
         board: FaultBoard,
         graph: &Graph,
         validity_ns: u64,
     ) -> Result<Self, PortError> {
+        let mut journal = JournalWriter::open(graph, ServiceName::Supervisor)?;
+        if let Some(left) = board.restored() {
+            journal.note(JournalEntry::new(JournalKind::Restored, 1).with_input(left));
+        }
         Ok(Self {
-            supervisor,
+            steps,
             diagnoses: graph.receiver(Topic::Diagnosis)?,
             detections: graph.receiver(Topic::Detection)?,
             detection_account: InputAccount::default(),
@@ -93,7 +98,7 @@ impl SupervisorStage {
             alarm_reported: AlarmCount::default(),
             board,
             latched_reported: None,
-            journal: JournalWriter::open(graph, ServiceName::Supervisor)?,
+            journal,
         })
     }
 
@@ -142,7 +147,7 @@ impl SupervisorStage {
             }
             self.alarm_reported = self.alarm;
         }
-        let latched = self.supervisor.latched();
+        let latched = self.steps.supervisor.latched();
         if latched != self.latched_reported {
             let kind = match latched {
                 Some(_) => EventKind::Latched,
@@ -183,9 +188,7 @@ impl Stage for SupervisorStage {
                     detection,
                 };
                 self.journal.note(journal_entry(inputs));
-                self.supervisor
-                    .step(Entry::Frame(inputs), self.action.block());
-                self.board.take(diagnosis, self.detection.readiness);
+                self.steps.take(inputs, self.action.block());
                 self.detection_is_new = false;
                 intake.stepped(header, cause.frame());
             }
@@ -193,8 +196,8 @@ impl Stage for SupervisorStage {
     }
 
     fn miss(&mut self, count: u32) {
-        self.supervisor
-            .step(Entry::Missed(count), self.action.block());
+        let supervisor = &mut self.steps.supervisor;
+        supervisor.step(Entry::Missed(count), self.action.block());
         self.journal
             .note(JournalEntry::new(JournalKind::Missed, count));
         if self.detection_is_new {
@@ -203,8 +206,7 @@ impl Stage for SupervisorStage {
                 detection: Some(&*self.detection),
             };
             self.journal.note(journal_entry(inputs));
-            self.supervisor
-                .step(Entry::Frame(inputs), self.action.block());
+            self.steps.take(inputs, self.action.block());
             self.detection_is_new = false;
         }
     }
@@ -237,7 +239,7 @@ impl Stage for SupervisorStage {
                 false => Weighing::new(action),
             },
         };
-        self.board.decide(action);
+        self.steps.faults.decide(action);
         if let Some(failure) = self.board.failure() {
             return Err(failure);
         }
@@ -256,7 +258,8 @@ impl Stage for SupervisorStage {
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         health.add_input(&self.detection_account);
         self.report(health, now_ns);
-        self.board.turn(health, now_ns);
+        let (faults, journal) = (&mut self.steps.faults, &mut self.journal);
+        self.board.turn(faults, journal, health, now_ns);
         let LastDecision {
             seq,
             action,
@@ -274,6 +277,6 @@ impl Stage for SupervisorStage {
     }
 
     fn keep_journal(&mut self, stamp: Stamp, clock: &dyn Clock) -> Result<(), PortError> {
-        self.journal.publish(&self.supervisor, stamp, clock)
+        self.journal.publish(&self.steps, stamp, clock)
     }
 }

@@ -1,6 +1,7 @@
 //! The life of faults: what failed, since when, and whether somebody knows.
 
 use strum::{FromRepr, IntoStaticStr};
+use vigil_checkpoint::CheckpointValue;
 
 use crate::block::block;
 use crate::header::Header;
@@ -13,6 +14,7 @@ pub const FAULTS: usize = 16;
 part! {
 /// A fault with its history. Times are instants of `CLOCK_MONOTONIC` at which the supervisor knew,
 /// but for the freeze frame's.
+#[derive(CheckpointValue)]
 pub struct FaultRecord, size 576 {
     /// Counts the graph's faults, from 1; 0: this place is free.
     pub number: u64,
@@ -144,7 +146,7 @@ pub enum Severity {
 }
 
 /// How robot and graph are, in one word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr, IntoStaticStr)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr, IntoStaticStr, CheckpointValue)]
 #[strum(serialize_all = "kebab-case")]
 #[repr(u32)]
 pub enum OverallState {

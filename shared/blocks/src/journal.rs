@@ -52,17 +52,31 @@ pub enum JournalKind {
     Refused = 6,
     /// A detection was seen for its blindness alone.
     Looked = 7,
+    /// The faults go on from those that an earlier supervisor has left: `input` names the block that
+    /// says them.
+    Restored = 8,
+    /// A frame was kept, for what is measured when a fault begins.
+    Kept = 9,
+    /// The faults have lived until `t_ns`; `count` says as bits, in the order of the data, which
+    /// services were silent.
+    Lived = 10,
+    /// An operator's order about faults was taken at `t_ns`.
+    Ordered = 11,
+    /// The faults were published; `input` names the block.
+    Told = 12,
 }
 
 part! {
 /// One entry of a service's journal. Blocks are named, not repeated: they stand in their topics.
 #[derive(Eq)]
-pub struct JournalEntry, size 48 {
+pub struct JournalEntry, size 56 {
     /// A [`JournalKind`].
     pub kind: u32,
-    /// Periods that were missed, particles that are allowed, frames that were refused.
+    /// Periods that were missed, particles that are allowed, frames that were refused, services
+    /// that were silent.
     pub count: u32,
-    /// The input: a sensor frame; for the supervisor a diagnosis. Epoch 0 stands for none.
+    /// The input: a sensor frame; for the supervisor a diagnosis, or what the kind says. Epoch 0
+    /// stands for none.
     pub input_epoch: u64,
     /// See `input_epoch`.
     pub input_seq: u64,
@@ -70,6 +84,8 @@ pub struct JournalEntry, size 48 {
     pub detection_epoch: u64,
     /// See `detection_epoch`.
     pub detection_seq: u64,
+    /// When it was, on `CLOCK_MONOTONIC`, ns; 0 where time has no effect.
+    pub t_ns: u64,
     /// The blindness that the detection was taken with, which a later prediction may have said.
     pub blind: u32,
     /// Reserved, zero.
@@ -92,6 +108,13 @@ impl JournalEntry {
     #[must_use]
     pub const fn with_input(mut self, id: BlockId) -> Self {
         (self.input_epoch, self.input_seq) = (id.epoch, id.seq);
+        self
+    }
+
+    /// The same entry at this time.
+    #[must_use]
+    pub const fn at(mut self, t_ns: u64) -> Self {
+        self.t_ns = t_ns;
         self
     }
 
@@ -118,11 +141,11 @@ impl JournalEntry {
 
 block! {
     /// What a service's step took in one turn, in order, and which block it published then. A turn
-    /// of more entries takes several blocks; the last one says what was published.
-    pub struct Journal, size 456 {
+    /// of more entries takes several blocks.
+    pub struct Journal, size 528 {
         /// Common header.
         pub header: Header,
-        /// Epoch of the belief or action that was published after these entries; 0 for none.
+        /// Epoch of the belief or action that was published after `answered` entries; 0 for none.
         pub answer_epoch: u64,
         /// Its sequence number.
         pub answer_seq: u64,
@@ -130,6 +153,10 @@ block! {
         pub lost: u32,
         /// Entries in use.
         pub count: u32,
+        /// Entries that were taken before the answer.
+        pub answered: u32,
+        /// Reserved, zero.
+        pub reserved: u32,
         /// The entries.
         pub entries: [JournalEntry; JOURNAL_ENTRIES],
     }
@@ -142,7 +169,18 @@ impl Journal {
         &self.entries[..(self.count as usize).min(JOURNAL_ENTRIES)]
     }
 
-    /// The block that was published after these entries, if there is one.
+    /// The entries before the answer, and those after it; all are before it if there is none.
+    #[must_use]
+    pub fn around_answer(&self) -> (&[JournalEntry], &[JournalEntry]) {
+        let used = self.used();
+        let answered = match self.answer() {
+            Some(_) => (self.answered as usize).min(used.len()),
+            None => used.len(),
+        };
+        used.split_at(answered)
+    }
+
+    /// The block that was published after `answered` entries, if there is one.
     #[must_use]
     pub fn answer(&self) -> Option<BlockId> {
         named(self.answer_epoch, self.answer_seq)

@@ -1,7 +1,5 @@
 //! A service's journal: what its step took, published after each turn; and now and then its state.
 
-use std::ops::Range;
-
 use vigil_blocks::{
     Block, BlockId, CHECKPOINT_BYTES, CheckpointPart, JOURNAL_ENTRIES, Journal, JournalEntry,
     JournalKind, STATE_BYTES_MAX,
@@ -96,11 +94,7 @@ impl JournalWriter {
         stamp: Stamp,
         clock: &dyn Clock,
     ) -> Result<(), PortError> {
-        let (answer, until) = self.answer.take().unzip();
-        let until = until.unwrap_or(0);
-        self.send(0..until, answer, (stamp, clock))?;
-        self.send(until..self.entries.len(), None, (stamp, clock))?;
-        self.entries.clear();
+        self.send_entries((stamp, clock))?;
         self.journal.prepare()?;
         if let Some(state) = self.state.take() {
             return self.send_part(state, (stamp, clock));
@@ -113,28 +107,25 @@ impl JournalWriter {
         Ok(())
     }
 
-    fn send(
-        &mut self,
-        entries: Range<usize>,
-        answer: Option<BlockId>,
-        (stamp, clock): (Stamp, &dyn Clock),
-    ) -> Result<(), PortError> {
-        let mut rest = &self.entries[entries];
-        let mut answer = answer;
-        while !rest.is_empty() || answer.is_some() {
-            let (now, later) = rest.split_at(rest.len().min(JOURNAL_ENTRIES));
-            rest = later;
+    fn send_entries(&mut self, (stamp, clock): (Stamp, &dyn Clock)) -> Result<(), PortError> {
+        let mut sent = 0;
+        while sent < self.entries.len() || self.answer.is_some() {
+            let rest = &self.entries[sent..];
+            let now = &rest[..rest.len().min(JOURNAL_ENTRIES)];
             let block = self.journal.block();
             block.lost = self.lost;
             block.count = now.len() as u32;
             block.entries[..now.len()].copy_from_slice(now);
-            if rest.is_empty()
-                && let Some(id) = answer.take()
+            // In the block that holds the last entry before it.
+            if let Some((id, until)) = self.answer.take_if(|(_, until)| *until <= sent + now.len())
             {
                 (block.answer_epoch, block.answer_seq) = (id.epoch, id.seq);
+                block.answered = (until - sent) as u32;
             }
+            sent += now.len();
             self.journal.send(stamp, clock)?;
         }
+        self.entries.clear();
         Ok(())
     }
 
@@ -213,15 +204,17 @@ mod tests {
         writer.publish(&0_u64, stamp(0), &clock).unwrap();
         let mut blocks = Vec::new();
         while let Some(block) = received.take_next() {
-            let kinds: Vec<u32> = block.used().iter().map(|entry| entry.kind).collect();
-            blocks.push((kinds.len(), kinds[0], block.answer().map(|id| id.seq)));
+            let (before, after) = block.around_answer();
+            let first = block.used()[0].kind;
+            let answer = block.answer().map(|id| id.seq);
+            blocks.push((first, before.len(), answer, after.len()));
         }
         let (begun, missed) = (JournalKind::Begun as u32, JournalKind::Missed as u32);
-        let budget = JournalKind::Budget as u32;
-        assert_eq!(
-            blocks,
-            [(8, begun, None), (3, missed, Some(0)), (1, budget, None)]
-        );
+        assert_eq!(blocks, [(begun, 8, None, 0), (missed, 3, Some(0), 1)]);
+        writer.answer(&*sender);
+        writer.publish(&0_u64, stamp(0), &clock).unwrap();
+        let block = received.take_next().unwrap();
+        assert!(block.used().is_empty() && block.answer().is_some());
         writer.publish(&0_u64, stamp(0), &clock).unwrap();
         assert!(
             received.take_next().is_none(),

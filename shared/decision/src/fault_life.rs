@@ -15,6 +15,7 @@ use vigil_blocks::{
     Action, FAULTS, FaultBelief, FaultRecord, FaultSource, FaultState, Faults, MODE_UNKNOWN,
     OverallState, RecoveryKind, SensorFrame, Severity,
 };
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_robot::FaultTree;
 
 use freeze_frames::FreezeFrames;
@@ -32,7 +33,7 @@ const UNNAMED_NS: u64 = 10_000_000_000;
 const STEP_MAX_NS: u64 = 200_000_000;
 
 /// What was decided in a cycle.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, CheckpointValue)]
 pub struct CycleDecision {
     /// See [`Action::action`].
     pub action: u32,
@@ -57,13 +58,11 @@ impl From<&Action> for CycleDecision {
 pub struct LifeInput<'a> {
     /// `CLOCK_MONOTONIC`, ns.
     pub now_ns: u64,
-    /// The newest diagnosis; none before the first.
-    pub diagnosis: Option<&'a FaultBelief>,
+    /// The diagnosis of a frame of this cycle, if an alarm could have risen. Without one, what is
+    /// known of the robot is held.
+    pub observed: Option<&'a FaultBelief>,
     /// What was decided.
     pub decided: CycleDecision,
-    /// True if this cycle says something of the robot: a frame was diagnosed, and an alarm could
-    /// have risen. Else what is known of the robot is held.
-    pub observes: bool,
     /// Services that have been silent for too long, as bits in the order of the data.
     pub silent_services: u32,
 }
@@ -78,7 +77,9 @@ pub enum LifeOrder {
 }
 
 /// Keeps the faults of a graph. Allocates nothing after it was made; never panics on any input.
+#[derive(Checkpoint)]
 pub struct FaultLife {
+    #[checkpoint(fixed)]
     rules: FaultRules,
     frames: FreezeFrames,
     present: PresentFaults,
@@ -122,7 +123,7 @@ impl FaultLife {
             *tracked = Tracked::restored(record);
         }
         self.fault_count = block.fault_count;
-        self.revision = block.revision.wrapping_add(1);
+        self.revision = block.revision;
     }
 
     /// Keeps a frame, for the freeze frame of a fault that begins about then.
@@ -138,7 +139,7 @@ impl FaultLife {
         let last_ns = self.last_ns.replace(now_ns).unwrap_or(now_ns);
         let passed_ns = now_ns.saturating_sub(last_ns).min(STEP_MAX_NS);
         self.present.take(input);
-        self.hold_names(if input.observes { passed_ns } else { 0 });
+        self.hold_names(input.observed.map_or(0, |_| passed_ns));
         let present = self.present.clone();
         let dropped = std::mem::take(&mut self.dropped_count);
         for it in present.list() {
@@ -149,7 +150,7 @@ impl FaultLife {
             let key = tracked.key();
             let is_present = present.list().any(|it| it.key() == key);
             // Of the robot nothing is over, and nothing lasts, while nothing is seen of it.
-            let counts = !tracked.is_of_robot() || input.observes;
+            let counts = !tracked.is_of_robot() || input.observed.is_some();
             let passed_ns = if counts { passed_ns } else { 0 };
             self.is_changed |= tracked.advance(is_present, passed_ns, now_ns, &self.rules);
         }
@@ -231,12 +232,12 @@ impl FaultLife {
         };
         let tracked = &mut self.tracked[at];
         let is_of_robot = it.source == FaultSource::Robot;
-        if is_of_robot && !input.observes {
+        if is_of_robot && input.observed.is_none() {
             return;
         }
         tracked.describe(it, input);
         let begins = tracked.record.frame_t_capture_ns == 0 && is_of_robot;
-        if begins && let Some(diagnosis) = input.diagnosis {
+        if begins && let Some(diagnosis) = input.observed {
             let known = [diagnosis.onset_t_capture_ns, diagnosis.alarm_t_capture_ns];
             let onset_ns = known.into_iter().find(|at_ns| *at_ns != 0);
             self.frames.freeze(onset_ns, &mut tracked.record);

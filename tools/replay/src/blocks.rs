@@ -3,10 +3,11 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use vigil_blocks::{
-    Action, Block, BlockId, DetectionBelief, FaultBelief, HealthyBelief, ParticleBlock,
-    SensorFrame, WeightedHypothesis,
+    Action, Block, BlockId, Control, DetectionBelief, FaultBelief, Faults, HealthyBelief,
+    ParticleBlock, SensorFrame, WeightedHypothesis,
 };
 use vigil_cycle::Topic;
+use vigil_cycle::topic::ServiceName;
 use vigil_flight::read_block;
 
 /// Blocks of one topic.
@@ -80,6 +81,9 @@ pub(crate) struct Blocks {
     pub(crate) detections: Window<DetectionBelief>,
     pub(crate) diagnoses: Window<FaultBelief>,
     pub(crate) actions: Window<Action>,
+    pub(crate) faults: Window<Faults>,
+    /// Operators' orders to the supervisor.
+    pub(crate) orders: Window<Control>,
     /// Computed again.
     pub(crate) hypotheses: Window<Hypotheses>,
 }
@@ -92,6 +96,8 @@ impl Blocks {
             detections: Window::new(kept_ns),
             diagnoses: Window::new(kept_ns),
             actions: Window::new(kept_ns),
+            faults: Window::new(kept_ns),
+            orders: Window::new(kept_ns),
             hypotheses: Window::new(kept_ns),
         }
     }
@@ -102,6 +108,8 @@ impl Blocks {
         self.detections.begin(now_ns);
         self.diagnoses.begin(now_ns);
         self.actions.begin(now_ns);
+        self.faults.begin(now_ns);
+        self.orders.begin(now_ns);
     }
 
     /// Keeps a recorded block, if a step may need it; false if it cannot be read.
@@ -111,6 +119,8 @@ impl Blocks {
             Topic::Detection => insert(&mut self.detections, now_ns, bytes),
             Topic::Diagnosis => insert(&mut self.diagnoses, now_ns, bytes),
             Topic::Action => insert(&mut self.actions, now_ns, bytes),
+            Topic::Faults => insert(&mut self.faults, now_ns, bytes),
+            Topic::Control(ServiceName::Supervisor) => insert(&mut self.orders, now_ns, bytes),
             _ => true,
         }
     }

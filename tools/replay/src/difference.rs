@@ -1,10 +1,16 @@
 //! Where two blocks are not the same.
 
 use vigil_blocks::layout::{Field, Layout};
-use vigil_blocks::{Block, BlockId};
+use vigil_blocks::{Block, BlockId, FaultRecord, FaultSet};
 
 /// Fields that belong to the ports, not to the step.
 const OF_THE_PORTS: [&str; 3] = ["header", "cause", "valid_until_ns"];
+
+/// What blocks are made of, beside numbers.
+const PARTS: [(&str, &[Field]); 2] = [
+    (FaultRecord::NAME, FaultRecord::FIELDS),
+    (FaultSet::NAME, FaultSet::FIELDS),
+];
 
 /// The first place in which something recorded and something computed differ.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -25,11 +31,13 @@ pub(crate) fn of_blocks<T: Block + Layout>(recorded: &T, computed: &T) -> Option
     let block = recorded.header().id();
     let (recorded, computed) = (bytemuck::bytes_of(recorded), bytemuck::bytes_of(computed));
     let fields = T::FIELDS.iter();
-    let compared = fields.filter(|field| !OF_THE_PORTS.contains(&field.name));
-    compared.into_iter().find_map(|field| {
-        let range = field.offset..field.offset + field.size;
-        let (recorded, computed) = (recorded.get(range.clone())?, computed.get(range)?);
-        (recorded != computed).then(|| of_field(block, field, (recorded, computed)))
+    let mut compared = fields.filter(|field| !OF_THE_PORTS.contains(&field.name));
+    let place = compared.find_map(|field| in_field(field, recorded, computed))?;
+    Some(Difference {
+        block,
+        field: place.field,
+        recorded: place.recorded,
+        computed: place.computed,
     })
 }
 
@@ -51,32 +59,50 @@ pub(crate) fn of_states(block: BlockId, recorded: &[u8], computed: &[u8]) -> Dif
     }
 }
 
-/// The first element that is not the same.
-fn of_field(block: BlockId, field: &Field, (recorded, computed): (&[u8], &[u8])) -> Difference {
+/// A number that is not the same.
+struct Place {
+    field: String,
+    recorded: String,
+    computed: String,
+}
+
+/// The first number of a field that is not the same, in the bytes that the field lies in.
+fn in_field(field: &Field, recorded: &[u8], computed: &[u8]) -> Option<Place> {
+    let range = field.offset..field.offset + field.size;
+    let (recorded, computed) = (recorded.get(range.clone())?, computed.get(range)?);
     let (is_array, element) = match field.type_text.strip_prefix('[') {
         Some(array) => (true, array.split(';').next().unwrap_or_default()),
         None => (false, field.type_text),
     };
+    let part = PARTS.iter().find(|(name, _)| *name == element);
+    let fields = part.map_or(&[][..], |(_, fields)| fields);
     let size = match element {
         "f64" | "u64" => 8,
         "u32" => 4,
         "u16" => 2,
         "u8" => 1,
-        _ => 8.min(recorded.len()),
+        _ => fields.last().map_or(8, |last| last.offset + last.size),
     };
     let pairs = recorded.chunks(size).zip(computed.chunks(size));
-    let found = pairs.enumerate().find(|(_, (a, b))| a != b);
-    let (index, (a, b)) = found.unwrap_or((0, (recorded, computed)));
+    let (index, (recorded, computed)) = pairs.enumerate().find(|(_, (a, b))| a != b)?;
     let name = match is_array {
         true => format!("{}[{index}]", field.name),
         false => field.name.to_owned(),
     };
-    Difference {
-        block,
-        field: name,
-        recorded: number(element, a),
-        computed: number(element, b),
-    }
+    let inner = fields
+        .iter()
+        .find_map(|field| in_field(field, recorded, computed));
+    Some(match inner {
+        Some(inner) => Place {
+            field: format!("{name}.{}", inner.field),
+            ..inner
+        },
+        None => Place {
+            field: name,
+            recorded: number(element, recorded),
+            computed: number(element, computed),
+        },
+    })
 }
 
 /// A number in words; bytes of anything else.
@@ -96,7 +122,7 @@ fn number(of: &str, bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use vigil_blocks::DetectionBelief;
+    use vigil_blocks::{DetectionBelief, Faults};
 
     #[test]
     fn the_first_field_that_differs_is_named() {
@@ -115,5 +141,17 @@ mod tests {
         let values = (found.recorded.as_str(), found.computed.as_str());
         let said = (found.field.as_str(), values.0, values.1);
         assert_eq!(said, ("alarm_count", "0", "3"));
+    }
+
+    #[test]
+    fn a_field_of_a_part_is_named_with_its_place() {
+        let recorded = Faults::default();
+        let mut computed = recorded;
+        computed.records[3].channel[2] = 1.0;
+        let found = of_blocks(&recorded, &computed).unwrap();
+        assert_eq!(found.field, "records[3].channel[2]");
+        computed.records[3].p = 0.5;
+        let found = of_blocks(&recorded, &computed).unwrap();
+        assert_eq!(found.field, "records[3].p");
     }
 }

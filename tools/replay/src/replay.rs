@@ -6,8 +6,8 @@ use std::path::Path;
 
 use vigil_blocks::layout::Layout;
 use vigil_blocks::{
-    Action, Block, BlockId, CheckpointPart, DetectionBelief, FaultBelief, Journal, JournalEntry,
-    STATE_BYTES_MAX,
+    Action, Block, BlockId, CheckpointPart, DetectionBelief, FaultBelief, Faults, Journal,
+    JournalEntry, JournalKind, STATE_BYTES_MAX,
 };
 use vigil_cycle::Topic;
 use vigil_cycle::topic::ServiceName;
@@ -39,6 +39,8 @@ pub enum Answer {
     Diagnosis(Box<FaultBelief>),
     /// The supervisor's.
     Action(Box<Action>),
+    /// The supervisor's, about faults.
+    Faults(Box<Faults>),
 }
 
 /// What happened at a moment of the replay.
@@ -233,14 +235,30 @@ impl Replay {
         let Some((t_ns, block)) = self.courses[place].journal.pop_front() else {
             return Ok(());
         };
-        let course = &mut self.courses[place];
-        let service = course.service;
-        if let Some(what) = course.follow(&block) {
+        if let Some(what) = self.courses[place].follow(&block) {
             self.gap(place, t_ns, what);
         }
-        for entry in block.used() {
+        let (before, after) = block.around_answer();
+        self.take(place, t_ns, before)?;
+        if let Some(id) = block.answer() {
+            self.answer(place, t_ns, id);
+        }
+        self.take(place, t_ns, after)?;
+        self.compare_state(place, t_ns, block.header.id());
+        Ok(())
+    }
+
+    /// Computes entries of a journal.
+    fn take(
+        &mut self,
+        place: usize,
+        t_ns: u64,
+        entries: &[JournalEntry],
+    ) -> Result<(), ReplayError> {
+        for entry in entries {
             let course = &mut self.courses[place];
             if begins(entry) {
+                let service = course.service;
                 course.step = Step::new(service, &self.setup)?;
                 course.standing = Standing::Following;
                 course.tally.begun += 1;
@@ -256,11 +274,12 @@ impl Replay {
                     Err(_) => self.gap(place, t_ns, ASSERTION_FAILED),
                 }
             }
+            if entry.kind == JournalKind::Told as u32
+                && let Some(id) = entry.input()
+            {
+                self.answer_faults(place, t_ns, id);
+            }
         }
-        if let Some(id) = block.answer() {
-            self.answer(place, t_ns, id);
-        }
-        self.compare_state(place, t_ns, block.header.id());
         Ok(())
     }
 
@@ -311,11 +330,35 @@ impl Replay {
                 (Answer::Diagnosis(answer), compared)
             }
             _ => {
+                course.step.decided(&answers.action);
                 let answer = std::mem::take(&mut answers.action);
                 let compared = compared(&blocks.actions, id, &*answer);
                 (Answer::Action(answer), compared)
             }
         };
+        self.answered(place, t_ns, answer, compared);
+    }
+
+    /// Compares the faults with what was published of them.
+    fn answer_faults(&mut self, place: usize, t_ns: u64, id: BlockId) {
+        let course = &mut self.courses[place];
+        course.tally.answers += 1;
+        if course.standing == Standing::Following {
+            let answer = std::mem::take(&mut self.answers.faults);
+            let compared = compared(&self.blocks.faults, id, &*answer);
+            self.answered(place, t_ns, Answer::Faults(answer), compared);
+        }
+    }
+
+    /// Counts and tells what was computed.
+    fn answered(
+        &mut self,
+        place: usize,
+        t_ns: u64,
+        answer: Answer,
+        compared: Option<Option<Difference>>,
+    ) {
+        let course = &mut self.courses[place];
         let service = course.service;
         course.tally.compared += u64::from(compared.is_some());
         course.tally.unrecorded += u64::from(compared.is_none());

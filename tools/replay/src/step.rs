@@ -1,14 +1,15 @@
 //! A service's step, as the service builds it, fed with entries of its journal.
 
 use vigil_blocks::{
-    Action, DetectionBelief, Entry, FaultBelief, JournalEntry, JournalKind, ParticleBlock,
+    Action, DetectionBelief, Entry, FaultBelief, Faults, JournalEntry, JournalKind, ParticleBlock,
 };
 use vigil_checkpoint::{Checkpoint, CheckpointError, CheckpointReader, CheckpointWriter};
 use vigil_cycle::topic::ServiceName;
-use vigil_decision::{Inputs, Supervisor};
+use vigil_decision::Inputs;
 use vigil_diagnosis::detect::Detector;
 use vigil_diagnosis::identify::{Diagnoser, Input};
 use vigil_setup::Setup;
+use vigil_supervisor::{FaultStep, Steps};
 
 use crate::blocks::Blocks;
 use crate::error::ReplayError;
@@ -23,6 +24,7 @@ pub(crate) struct Answers {
     detected: Box<ParticleBlock>,
     hypotheses: Box<ParticleBlock>,
     pub(crate) action: Box<Action>,
+    pub(crate) faults: Box<Faults>,
 }
 
 /// A block that an entry names was not recorded.
@@ -32,6 +34,8 @@ pub(crate) enum Missing {
     Detection,
     Hypotheses,
     Diagnosis,
+    Faults,
+    Order,
     Version,
 }
 
@@ -42,6 +46,8 @@ impl Missing {
             Self::Detection => "a detection was not recorded",
             Self::Hypotheses => "the detector's hypotheses are not known",
             Self::Diagnosis => "a diagnosis was not recorded",
+            Self::Faults => "the faults that an earlier supervisor has left were not recorded",
+            Self::Order => "an operator's order was not recorded",
             Self::Version => "the journal is of another version",
         }
     }
@@ -51,7 +57,7 @@ impl Missing {
 pub(crate) enum Step {
     Detector(Box<Detector>),
     Identifier(Box<Diagnoser>),
-    Supervisor(Box<Supervisor>),
+    Supervisor(Box<Steps>),
 }
 
 impl Step {
@@ -61,9 +67,10 @@ impl Step {
             ServiceName::Identifier => {
                 Self::Identifier(built(service, vigil_identifier::assemble(setup))?)
             }
-            ServiceName::Supervisor => {
-                Self::Supervisor(built(service, vigil_supervisor::assemble(setup))?)
-            }
+            ServiceName::Supervisor => Self::Supervisor(Box::new(Steps {
+                supervisor: *built(service, vigil_supervisor::assemble(setup))?,
+                faults: *built(service, vigil_supervisor::fault_step(setup))?,
+            })),
             ServiceName::SensorSim | ServiceName::Detector => {
                 Self::Detector(built(service, vigil_detector::assemble(setup))?)
             }
@@ -81,7 +88,7 @@ impl Step {
         match self {
             Self::Detector(detector) => detect(detector, kind, entry, (blocks, to)),
             Self::Identifier(identifier) => identify(identifier, kind, entry, (blocks, to)),
-            Self::Supervisor(supervisor) => decide(supervisor, kind, entry, (blocks, to)),
+            Self::Supervisor(steps) => decide(steps, kind, entry, (blocks, to)),
         }
     }
 
@@ -91,10 +98,17 @@ impl Step {
         match self {
             Self::Detector(detector) => detector.save(&mut writer),
             Self::Identifier(identifier) => identifier.save(&mut writer),
-            Self::Supervisor(supervisor) => supervisor.save(&mut writer),
+            Self::Supervisor(steps) => steps.save(&mut writer),
         }
         let bytes = writer.finish().ok()?;
         room.get(..bytes)
+    }
+
+    /// Takes what the service has published, from which it may go on.
+    pub(crate) fn decided(&mut self, action: &Action) {
+        if let Self::Supervisor(steps) = self {
+            steps.faults.decide(action);
+        }
     }
 
     /// Takes over a state.
@@ -103,7 +117,7 @@ impl Step {
         match self {
             Self::Detector(detector) => detector.load(&mut reader),
             Self::Identifier(identifier) => identifier.load(&mut reader),
-            Self::Supervisor(supervisor) => supervisor.load(&mut reader),
+            Self::Supervisor(steps) => steps.load(&mut reader),
         }
         reader.finish()
     }
@@ -137,7 +151,7 @@ fn detect(
         JournalKind::Budget => detector.step(Entry::Budget(entry.count), belief, particles),
         JournalKind::Reset => detector.step(Entry::Reset, belief, particles),
         JournalKind::Refused => detector.refuse(),
-        JournalKind::Begun | JournalKind::Looked => {}
+        _ => {}
     }
     Ok(())
 }
@@ -174,13 +188,13 @@ fn identify(
         JournalKind::Missed => identifier.step(Entry::Missed(entry.count), belief, out),
         JournalKind::Budget => identifier.step(Entry::Budget(entry.count), belief, out),
         JournalKind::Reset => identifier.step(Entry::Reset, belief, out),
-        JournalKind::Begun | JournalKind::Refused => {}
+        _ => {}
     }
     Ok(())
 }
 
 fn decide(
-    supervisor: &mut Supervisor,
+    steps: &mut Steps,
     kind: JournalKind,
     entry: &JournalEntry,
     (blocks, to): (&Blocks, &mut Answers),
@@ -203,12 +217,43 @@ fn decide(
                 diagnosis: diagnosis.transpose()?,
                 detection: detection.as_deref(),
             };
-            supervisor.step(Entry::Frame(inputs), action);
+            steps.take(inputs, action);
         }
-        JournalKind::Missed => supervisor.step(Entry::Missed(entry.count), action),
-        JournalKind::Budget => supervisor.step(Entry::Budget(entry.count), action),
-        JournalKind::Reset => supervisor.step(Entry::Reset, action),
-        JournalKind::Begun | JournalKind::Looked | JournalKind::Refused => {}
+        JournalKind::Missed => steps.supervisor.step(Entry::Missed(entry.count), action),
+        JournalKind::Budget => steps.supervisor.step(Entry::Budget(entry.count), action),
+        JournalKind::Reset => steps.supervisor.step(Entry::Reset, action),
+        _ => live(&mut steps.faults, kind, entry, (blocks, &mut to.faults))?,
+    }
+    Ok(())
+}
+
+/// What the faults' life takes.
+fn live(
+    step: &mut FaultStep,
+    kind: JournalKind,
+    entry: &JournalEntry,
+    (blocks, faults): (&Blocks, &mut Faults),
+) -> Result<(), Missing> {
+    match kind {
+        JournalKind::Restored => {
+            let left = entry.input().and_then(|id| blocks.faults.get(id));
+            step.restore(left.ok_or(Missing::Faults)?);
+        }
+        JournalKind::Kept => {
+            let frame = entry.input().and_then(|id| blocks.frames.get(id));
+            step.keep(frame.ok_or(Missing::Frame)?);
+        }
+        JournalKind::Lived => {
+            step.live(entry.t_ns, entry.count);
+            while step.take_change().is_some() {}
+        }
+        JournalKind::Ordered => {
+            let order = entry.input().and_then(|id| blocks.orders.get(id));
+            step.obey(order.ok_or(Missing::Order)?, entry.t_ns);
+            while step.take_change().is_some() {}
+        }
+        JournalKind::Told => step.write(faults),
+        _ => {}
     }
     Ok(())
 }

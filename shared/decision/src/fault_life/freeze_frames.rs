@@ -1,12 +1,13 @@
 //! The last seconds of frames, for what was measured when a fault began.
 
 use vigil_blocks::{CHANNELS, COMMANDS, FaultRecord, SensorFrame};
+use vigil_checkpoint::{Checkpoint, CheckpointValue};
 
 /// Frames that are kept, and the least time between two of them, ns: five seconds.
 const FRAMES: usize = 512;
 const INTERVAL_NS: u64 = 10_000_000;
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, CheckpointValue)]
 struct KeptFrame {
     t_capture_ns: u64,
     channel_valid: u64,
@@ -16,8 +17,10 @@ struct KeptFrame {
 }
 
 /// A ring of frames.
+#[derive(Checkpoint)]
 pub(super) struct FreezeFrames {
     /// All there from the beginning, so that no page is touched first in a cycle.
+    #[checkpoint(each)]
     ring: Vec<KeptFrame>,
     /// Frames in it, and the place of the next.
     count: usize,

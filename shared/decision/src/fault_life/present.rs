@@ -3,6 +3,7 @@
 use vigil_blocks::{
     FAULT_NODES, FaultBelief, FaultSource, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
 };
+use vigil_checkpoint::Checkpoint;
 use vigil_robot::FaultTree;
 
 use super::LifeInput;
@@ -27,11 +28,13 @@ impl Present {
 }
 
 /// What is present in a cycle.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Checkpoint)]
 pub(super) struct PresentFaults {
     /// Leaves below each node; of a leaf, itself.
+    #[checkpoint(fixed)]
     below: [u64; FAULT_NODES],
     /// Nodes that are no leaves.
+    #[checkpoint(fixed)]
     abstract_nodes: u64,
     /// Nodes that are reported.
     nodes: u64,
@@ -65,8 +68,7 @@ impl PresentFaults {
     /// Takes a cycle. What was diagnosed stays while nothing is seen.
     pub(super) fn take(&mut self, input: LifeInput<'_>) {
         (self.silent_services, self.blind) = (input.silent_services, input.decided.blind);
-        let diagnosis = input.diagnosis.filter(|_| input.observes);
-        let Some(diagnosis) = diagnosis.filter(|it| it.reported != MODE_BLIND) else {
+        let Some(diagnosis) = input.observed.filter(|it| it.reported != MODE_BLIND) else {
             return;
         };
         let nodes = match diagnosis.reported {

@@ -62,9 +62,8 @@ impl Story {
             self.now_ns += CYCLE_NS;
             self.life.step(LifeInput {
                 now_ns: self.now_ns,
-                diagnosis: belief,
+                observed: belief.filter(|_| self.observes),
                 decided: self.decided,
-                observes: self.observes,
                 silent_services: self.silent_services,
             });
         }
@@ -462,9 +461,8 @@ proptest! {
             belief.set_count = action;
             life.step(LifeInput {
                 now_ns,
-                diagnosis: Some(&belief),
+                observed: Some(&*belief).filter(|_| kind % 4 != 0),
                 decided,
-                observes: kind % 4 != 0,
                 silent_services,
             });
             life.obey(LifeOrder::Acknowledge(u64::from(blind % 4)), now_ns);

@@ -1,13 +1,14 @@
 //! One fault through its life.
 
 use vigil_blocks::{EVIDENCE, FAULT_NODES, FaultRecord, FaultSource, FaultState, MODE_UNKNOWN};
+use vigil_checkpoint::CheckpointValue;
 
 use super::LifeInput;
 use super::present::Present;
 use super::rules::FaultRules;
 
 /// A fault, and how long it has been there or gone.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 pub(super) struct Tracked {
     pub record: FaultRecord,
     /// Time that it was present in while pending, ns.
@@ -100,7 +101,7 @@ impl Tracked {
             record.first_ns = input.now_ns;
         }
         record.last_ns = input.now_ns;
-        let Some(diagnosis) = input.diagnosis.filter(|_| it.source == FaultSource::Robot) else {
+        let Some(diagnosis) = input.observed.filter(|_| it.source == FaultSource::Robot) else {
             record.p = 1.0;
             return;
         };

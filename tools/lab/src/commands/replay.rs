@@ -6,6 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
+use vigil_blocks::OverallState;
 use vigil_cycle::topic::ServiceName;
 use vigil_replay::{Answer, Difference, Moment, Replay, Tally, What};
 use vigil_setup::Setup;
@@ -108,6 +109,7 @@ struct Teller<'a> {
     alarm: Option<bool>,
     mode: Option<u32>,
     action: Option<u32>,
+    overall: Option<u32>,
     differences: Vec<ListedDifference>,
     gaps: Vec<ListedGap>,
 }
@@ -126,6 +128,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         alarm: None,
         mode: None,
         action: None,
+        overall: None,
         differences: Vec::new(),
         gaps: Vec::new(),
     };
@@ -257,6 +260,12 @@ impl Teller<'_> {
                 let name = setup.decision.actions().get(action.action as usize);
                 let name = name.map_or("?", String::as_str);
                 (before != Some(action.action)).then(|| format!("supervisor: {name}"))
+            }
+            Answer::Faults(faults) => {
+                let before = self.overall.replace(faults.overall);
+                let name = OverallState::from_repr(faults.overall);
+                let name = name.map_or("?", OverallState::name);
+                (before != Some(faults.overall)).then(|| format!("supervisor: overall {name}"))
             }
         }
     }
