@@ -29,6 +29,17 @@ def vigil(*arguments):
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=WATCHDOG_S)
 
 
+def wait_for(look, what):
+    """Until `look` finds something; what it was."""
+    until = time.monotonic() + WATCHDOG_S
+    while time.monotonic() < until:
+        found = look()
+        if found:
+            return found
+        time.sleep(0.05)
+    raise TimeoutError(what)
+
+
 def publisher(name, *arguments):
     """A publisher of examples/ as a process."""
     command = [sys.executable, EXAMPLES / name, *map(str, arguments)]
@@ -38,11 +49,11 @@ def publisher(name, *arguments):
 class Graph:
     """A graph of its own name on the default configuration; stopped at the end of a `with`."""
 
-    def __init__(self, *options, name=None, recordings=None, before_s=3.0):
+    def __init__(self, *options, name=None, recordings=None, before_s=3.0, after_s=1.0):
         self.name = name or f"py{os.getpid()}-{uuid.uuid4().hex[:6]}"
         self.options = options
         # Folder of the black box, if it is to run.
-        self.recordings, self.before_s = recordings, before_s
+        self.recordings, self.before_s, self.after_s = recordings, before_s, after_s
         # A port of its own: another graph may be taking datagrams on this machine.
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
             free.bind(("127.0.0.1", 0))
@@ -55,7 +66,7 @@ class Graph:
         with open(config / "rover.toml", "a") as file:
             file.write(f'\n[sensor.socket]\nudp = "127.0.0.1:{self.udp_port}"\n')
             if self.recordings:
-                times = f"before_s = {self.before_s}\nafter_s = 1.0\n"
+                times = f"before_s = {self.before_s}\nafter_s = {self.after_s}\n"
                 file.write(f'[blackbox]\nfolder = "{self.recordings}"\n{times}')
         command = [BINARIES / "vigil-launcher", "--json", "--config", config / "rover.toml"]
         command += [] if self.recordings else ["--no-blackbox"]

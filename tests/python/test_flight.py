@@ -9,7 +9,7 @@ import tempfile
 import time
 import unittest
 
-from harness import BINARIES, WATCHDOG_S, Graph, events, vigil
+from harness import BINARIES, WATCHDOG_S, Graph, events, vigil, wait_for
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -46,16 +46,6 @@ class Flight:
         """The last values of a topic that has names for them."""
         message = self.last(topic)
         return dict(zip(message.name, message.position))
-
-
-def wait_for(look, what):
-    until = time.monotonic() + WATCHDOG_S
-    while time.monotonic() < until:
-        found = look()
-        if found:
-            return found
-        time.sleep(0.05)
-    raise TimeoutError(what)
 
 
 def replayed(path):
