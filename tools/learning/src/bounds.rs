@@ -1,5 +1,6 @@
 //! Learned numbers that ended on a bound set by hand: what stands there was not measured.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// A number this close to a bound, relative to it, stands on it: factors on both round.
@@ -8,7 +9,7 @@ const ROUNDING: f64 = 1e-9;
 const NAMED_MAX: usize = 3;
 
 /// How a number came to differ from what the log says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum BoundCause {
     /// The log says less.
@@ -20,7 +21,7 @@ pub enum BoundCause {
 }
 
 /// A number of a model that the log alone did not decide.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Bound {
     /// Its key in the model file.
     pub key: String,
@@ -30,7 +31,7 @@ pub struct Bound {
     pub value: f64,
     /// The bound.
     pub bound: f64,
-    /// Which bound.
+    /// On which side of the bound the log is.
     pub held: BoundCause,
     /// Why it is there.
     pub why: &'static str,
@@ -76,7 +77,7 @@ impl Limits {
 }
 
 /// The numbers of one model that stand on a bound.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 #[serde(transparent)]
 pub struct Bounds {
     pub(crate) found: Vec<Bound>,

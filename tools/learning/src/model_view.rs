@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_robot::learned::Calibration;
 use vigil_robot::learned::model::Provenance;
@@ -10,24 +11,24 @@ use vigil_robot::learned::model::Provenance;
 const INTERVAL_H: f64 = 24.0;
 
 /// What a model is of, and where it comes from.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Source {
-    /// Robot.
+    /// Name of the robot.
     pub robot: String,
-    /// Wheels, in the order of every per-wheel array.
+    /// Names of its wheels, in the order of every per-wheel array; none for a model of channels.
     pub wheels: Vec<String>,
-    /// Layout of the file.
+    /// Version of the file's layout.
     pub layout_version: u32,
     /// Hash of the model, as beliefs and reports carry it.
     pub model_hash: String,
-    /// Whether the file says that a person has changed it.
+    /// True if the file says that a person has changed it.
     pub edited: bool,
     /// Where the model comes from.
     pub provenance: Provenance,
 }
 
 /// Threshold for one set of channels and form of detection.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Alarm {
     /// What was fitted.
     #[serde(flatten)]

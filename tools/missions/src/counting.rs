@@ -7,19 +7,19 @@
 use statrs::distribution::{Beta, ContinuousCDF};
 
 /// A number that was fitted.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, schemars::JsonSchema)]
 pub struct FittedChance {
     /// Where it stands in the file, or what it is a chance of.
     pub key: String,
-    /// What it was.
+    /// The number in the file.
     pub by_hand: f64,
-    /// What it is.
+    /// The fitted number.
     pub fitted: f64,
     /// Bounds of its 95 % credible interval, as if steps were independent and counts seen.
     pub interval: [f64; 2],
-    /// How often it was so.
+    /// How often it was so in the missions.
     pub count: f64,
-    /// How often it might have been.
+    /// How often it might have been so.
     pub visits: f64,
 }
 

@@ -1,5 +1,6 @@
 //! One channel of a model: from what it is predicted, and how well.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::AXES;
@@ -24,7 +25,7 @@ pub fn lags(interval_s: f64) -> usize {
 }
 
 /// What a term is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Regressor {
     /// 1.
@@ -33,15 +34,15 @@ pub enum Regressor {
     Command,
     /// One axis of the command, some observations ago, divided by its learned size.
     Lagged,
-    /// One axis of the command, smoothed with one of [`SMOOTHING_S`] and divided by its learned
-    /// size, times the product of powers of the axes as they are.
+    /// One axis of the command, smoothed with a time constant and divided by its learned size,
+    /// times the product of powers of the axes as they are.
     Smoothed,
     /// Sense of a drive's commanded speed, -1 to 1.
     Sense,
 }
 
 /// One term of a prediction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Term {
     /// What it is.
@@ -170,10 +171,10 @@ impl Term {
 pub type VarianceBasis = [f64; 3];
 
 /// A channel's prediction and what is known of its error.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Channel {
-    /// Name, see [`super::component::targets`].
+    /// Its name.
     pub name: String,
     /// What it comes back to the same after, in its unit, if it is an angle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -182,9 +183,10 @@ pub struct Channel {
     pub terms: Vec<Term>,
     /// Weight of each term.
     pub weights: Vec<f64>,
-    /// Variance of the residual of one observation, by [`VarianceBasis`].
+    /// Variance of the residual of one observation: constant, by the square of the command, by the
+    /// square of what the prediction has changed by.
     pub variance: VarianceBasis,
-    /// Deviations of a run's own offset, in the channel's unit, and of its own gain.
+    /// Standard deviations of a run's own offset, in the channel's unit, and of its own gain.
     pub context_sd: [f64; 2],
     /// Root mean square of the channel's value in motion.
     pub usual: f64,

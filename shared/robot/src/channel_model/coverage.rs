@@ -1,5 +1,6 @@
 //! Which commands a log covers: on others a model knows less.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::AXES;
@@ -18,7 +19,7 @@ const COMBINATIONS_MAX: usize = 15;
 const NOVEL: f64 = 10.0;
 
 /// What was learned of one axis of the command.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
     /// Name of the axis.

@@ -1,5 +1,6 @@
 //! The file of a model of channels.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
@@ -35,7 +36,7 @@ const REST_MIN_S: f64 = 3.0;
 const _: () = assert!(AXES == 4 && CHANNELS_MAX == 28 && DRIVES_MAX == 8);
 
 /// Faults whose log-odds behave alike without a fault.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Class {
     /// A sensor's readings are changed in a steady way.
@@ -100,18 +101,18 @@ impl Class {
 
 /// How often the log-odds of a class exceed a level without a fault: more rarely by `exp(-slope)`
 /// per unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tail {
     /// Set of channels: `pose` or `pose+encoders`.
     pub sensors: String,
-    /// Class.
+    /// Class of the faults.
     pub class: Class,
-    /// Level, natural log-odds at [`FAULT_RATE_1_H`].
+    /// Level, natural log-odds at a prior fault rate of 1/h.
     pub level_log_odds: f64,
     /// Mean time between exceedances of it, h.
     pub interval_h: f64,
-    /// Slope.
+    /// Exponent by which exceedances grow rarer, per unit of log-odds above the level.
     pub slope: f64,
 }
 

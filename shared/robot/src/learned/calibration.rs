@@ -1,5 +1,6 @@
 //! Alarm thresholds for a stated mean time between false alarms.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::channels::Channels;
@@ -12,7 +13,7 @@ use crate::model_file::ModelError;
 /// Exceedances of a level by the log-odds of nominal runs grow rarer exponentially with the level:
 /// `interval(h) = interval_at_level · exp(slope (h - level))`. The slope is at most 1 for a filter
 /// that knows its model exactly, and smaller when the residuals are not quite white.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
     /// Channels for which it holds: `pose` or `pose+encoders`.

@@ -1,5 +1,6 @@
 //! The model file: written by `vigil learn`, read by detector and identifier.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use vigil_blocks::WHEELS;
 use vigil_inference::departure;
@@ -57,7 +58,7 @@ pub struct Model {
 
 /// Standard deviations of the sensors' white noise per sample at the reference rate; at another
 /// rate they scale so that the information per second is the same.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Noise {
     /// Rate for which the deviations hold, Hz.
@@ -73,7 +74,7 @@ pub struct Noise {
 }
 
 /// What is known of the command.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CommandModel {
     /// Time constant with which the body follows a change of the command, s. Assumed, not learned:

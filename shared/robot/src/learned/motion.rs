@@ -1,6 +1,7 @@
 //! Displacement per commanded metre as a polynomial of the signed curvature, and its noise.
 
 use nalgebra::{Matrix3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use vigil_inference::track::MotionNoise;
 
@@ -9,7 +10,7 @@ use vigil_inference::track::MotionNoise;
 const SPEED_REFERENCE_M_S: f64 = 0.2;
 /// `Σ c_i κ^i + d (1/|v| - 5 s/m)`: the paper's 4th-order polynomial in the signed curvature (the
 /// radius would have a pole straight ahead), plus the effect of speed on friction.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Curve {
     /// Coefficients of κ^0 to κ^4, κ in 1/m.
@@ -71,7 +72,7 @@ impl Curve {
 }
 
 /// Motion of one mode, in the body frame, per commanded metre.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MotionModel {
     /// Standard deviation of an offset that is constant in a run: yaw rad/m, forward, lateral m/m.

@@ -1,9 +1,10 @@
 //! Where a model comes from.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Where a model comes from.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
     /// Hash over the frames that were learned from.

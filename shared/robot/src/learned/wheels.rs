@@ -1,5 +1,6 @@
 //! Wheel rates and steering angles, and what an encoder says about its wheel.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use vigil_inference::logspace::{log_add, log_normal};
 
@@ -27,10 +28,10 @@ pub fn steering_angle(robot: &Description, wheel: usize, curvature: f64) -> f64 
 }
 
 /// Rate of one wheel beside rolling without slip.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RateModel {
-    /// Ratio to [`rolling_rate`].
+    /// Ratio to the rate of rolling without slip.
     pub ratio: f64,
     /// How far the rate stays behind that at any speed, rad/s, as a polynomial of the curvature,
     /// κ^0 to κ^2: a motor under proportional control yields by its load over its gain.
@@ -69,7 +70,7 @@ pub const CREEPING_RAD_S: f64 = 0.2;
 const RATE_FLOOR_RAD_S: f64 = 0.01;
 
 /// What encoders do in health and when broken.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EncoderModel {
     /// Probability that a healthy sample equals its predecessor bit for bit.

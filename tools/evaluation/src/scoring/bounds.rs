@@ -4,6 +4,7 @@
 //! and Pearson 1934): both cover the truth in at least 95 % of all repetitions, also with no
 //! event or no failure at all, where approximations by a normal distribution fail.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use statrs::distribution::{Beta, ContinuousCDF, Gamma, StudentsT};
 
@@ -57,15 +58,15 @@ pub fn binomial(right: usize, n: usize) -> Option<Bounds> {
 }
 
 /// A difference between two filters over the same runs, with 95 % bounds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Difference {
     /// Runs that count for both.
     pub n: usize,
     /// Mean difference, in the unit of the values.
     pub mean: f64,
-    /// Lower bound.
+    /// Lower bound of the mean difference.
     pub lower_95: f64,
-    /// Upper bound.
+    /// Upper bound of the mean difference.
     pub upper_95: f64,
 }
 

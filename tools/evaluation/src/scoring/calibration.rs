@@ -1,5 +1,6 @@
 //! Can the reported probabilities be believed?
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Case, JUDGED_S, Ratio, Taxonomy, Verdict};
@@ -74,9 +75,9 @@ impl Claims {
 }
 
 /// Claims of like probability.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Bin {
-    /// Claims.
+    /// Number of claims.
     pub n: usize,
     /// Least probability claimed.
     pub p_min: f64,
@@ -131,9 +132,9 @@ pub(super) fn judge(verdict: &Verdict, truth: &str, taxonomy: &Taxonomy) -> Verd
 }
 
 /// Calibration of the reported modes 2 s after the onset of the faults of one class.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Calibration {
-    /// Runs.
+    /// Number of runs.
     pub n: usize,
     /// Expected calibration error of `p_mode` in ten bins of equal width. An abstract node above
     /// the true leaf is true.
@@ -142,8 +143,8 @@ pub struct Calibration {
     pub brier_score: Option<f64>,
     /// The bins of the calibration error.
     pub reliability: Vec<Bin>,
-    /// Mean of -ln p(true mode), nats; the probability of unknown if the tree lacks the mode. See
-    /// [`super::Belief`] for that before an alarm; less than 1e-6 counts as that.
+    /// Mean of -ln p(true mode), nats; p is that of unknown if the tree lacks the mode, and at
+    /// least 1e-6.
     pub log_score_nats: Option<f64>,
     /// Runs in which something false was reported with more than 0.9 (`right` counts them).
     pub confident_wrong: Ratio,

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Case, JUDGED_S, Side, Taxonomy};
@@ -10,7 +11,7 @@ use super::{Case, JUDGED_S, Side, Taxonomy};
 pub type Matrix = BTreeMap<String, BTreeMap<String, usize>>;
 
 /// Confusion by coarser words than the leaf, 2 s after the onset; at the end of nominal runs.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, JsonSchema)]
 pub struct Coarse {
     /// Sides: `left`, `right`; without a common side, the mode itself.
     pub side: Matrix,

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::bounds::Difference;
@@ -51,7 +52,7 @@ impl Entrant {
 }
 
 /// A share of runs, and how it differs from the first filter's.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Share {
     /// This filter's.
     #[serde(flatten)]
@@ -61,7 +62,7 @@ pub struct Share {
 }
 
 /// Shares at instants after the onset.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Shares {
     /// 2 s after the onset.
     pub after_2_s: Share,
@@ -72,7 +73,7 @@ pub struct Shares {
 }
 
 /// One filter on the faults of one type.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Row {
     /// Name of the filter.
     pub filter: String,

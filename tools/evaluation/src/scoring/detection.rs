@@ -1,18 +1,19 @@
 //! Was the fault noticed, how soon, and was nothing else?
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Case, Instants, Spread, TIME_SLACK_S, Verdict, bounds};
 
 /// False alarms an hour, with exact 95 % bounds (Garwood) as if they came independently: several in
 /// one run may have one cause. Null without a time.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
 pub struct Rate {
-    /// False alarms an hour.
+    /// False alarms an hour; null without a time.
     pub false_alarms_per_h: Option<f64>,
-    /// Lower bound.
+    /// Lower 95 % bound of the same; null without a time.
     pub lower_95_per_h: Option<f64>,
-    /// Upper bound.
+    /// Upper 95 % bound of the same; null without a time.
     pub upper_95_per_h: Option<f64>,
 }
 
@@ -29,7 +30,7 @@ impl Rate {
 }
 
 /// Alarms without a fault.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 pub struct FalseAlarms {
     /// Nominal runs.
     pub nominal_runs: usize,
@@ -110,17 +111,17 @@ fn rises<'a>(verdicts: impl Iterator<Item = &'a Verdict>) -> impl Iterator<Item 
 }
 
 /// Detection of the faults of one class.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Detection {
     /// Runs with such a fault.
     pub n: usize,
     /// Runs in which the alarm rose at or after the onset.
     pub detected: usize,
-    /// The others.
+    /// Runs in which it did not.
     pub missed: usize,
-    /// Detected by then. Runs that end earlier do not count.
+    /// Runs detected by some time after the onset. Runs that end earlier do not count.
     pub within: Instants,
-    /// From the onset to the alarm, of the faults detected.
+    /// Time from the onset to the alarm, of the faults detected.
     pub delay: Spread,
     /// Every delay, rising, s.
     pub delays_s: Vec<f64>,

@@ -1,11 +1,12 @@
 //! Was the right fault named?
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Case, Ratio, Spread, Taxonomy, Verdict};
 
 /// A ratio at several instants after the onset.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
 pub struct Instants {
     /// 2 s after the onset.
     pub after_2_s: Ratio,
@@ -36,7 +37,7 @@ impl Instants {
 }
 
 /// Identification of the faults of one class.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Identification {
     /// The right leaf was named.
     pub leaf: Instants,
@@ -47,7 +48,7 @@ pub struct Identification {
     pub class: Instants,
     /// `UNKNOWN` was reported.
     pub unknown: Instants,
-    /// From the onset until the right leaf was named for good.
+    /// Time from the onset until the right leaf was named for good.
     pub isolation: Spread,
     /// Ids of the runs whose leaf was wrong 2 s after the onset.
     pub wrong_run_ids_after_2_s: Vec<u32>,

@@ -30,6 +30,7 @@ mod trade_off;
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 pub use belief::Belief;
@@ -153,7 +154,7 @@ impl Case {
 }
 
 /// How good the verdicts of many runs are.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Score {
     /// Runs by kind; nominal ones are `nominal`.
     pub runs: BTreeMap<String, usize>,
@@ -166,7 +167,7 @@ pub struct Score {
     pub detection: BTreeMap<String, Detection>,
     /// Identification by class of fault; `all` is every one.
     pub identification: BTreeMap<String, Identification>,
-    /// True mode, reported mode, runs: 2 s after the onset, and at the end of nominal runs.
+    /// Runs by true and by reported mode: 2 s after the onset, and at the end of nominal runs.
     pub confusion: Matrix,
     /// The same by side and by type.
     pub confusion_by: Coarse,
@@ -175,7 +176,8 @@ pub struct Score {
     pub calibration: BTreeMap<String, Calibration>,
     /// Detection delay against false alarms over all thresholds of the detector.
     pub trade_off: TradeOff,
-    /// What is said and done at every instant, by class: see [`field`].
+    /// What is said and done at every instant: figures by class of run and by name, of which the
+    /// unit is the last part.
     pub field: BTreeMap<String, field::Figures>,
 }
 

@@ -1,11 +1,13 @@
 //! Shares of runs and spreads of times.
 
-use serde::{Serialize, Serializer};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::bounds::{self, Bounds};
 
 /// Cases that were right.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
+#[serde(into = "WrittenRatio")]
 pub struct Ratio {
     /// Cases that count.
     pub n: usize,
@@ -14,12 +16,17 @@ pub struct Ratio {
 }
 
 /// How a ratio is written.
-#[derive(Serialize)]
-struct Written {
+#[derive(Serialize, JsonSchema)]
+struct WrittenRatio {
+    /// Cases that count.
     n: usize,
+    /// Cases that were right.
     right: usize,
+    /// `right` over `n`; null without a case.
     fraction: Option<f64>,
+    /// Lower end of exact 95 % bounds on the fraction; null without a case.
     lower_95: Option<f64>,
+    /// Upper end of the same bounds; null without a case.
     upper_95: Option<f64>,
 }
 
@@ -42,32 +49,29 @@ impl Ratio {
     }
 }
 
-impl Serialize for Ratio {
-    /// Keys `n`, `right`, `fraction`, `lower_95`, `upper_95`; the last three are null without a
-    /// case.
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let bounds = self.bounds_95();
-        let written = Written {
-            n: self.n,
-            right: self.right,
-            fraction: self.fraction(),
+impl From<Ratio> for WrittenRatio {
+    fn from(ratio: Ratio) -> Self {
+        let bounds = ratio.bounds_95();
+        Self {
+            n: ratio.n,
+            right: ratio.right,
+            fraction: ratio.fraction(),
             lower_95: bounds.map(|bounds| bounds.lower),
             upper_95: bounds.map(|bounds| bounds.upper),
-        };
-        written.serialize(serializer)
+        }
     }
 }
 
 /// Percentiles (nearest rank) of times, s; null without a value.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
 pub struct Spread {
-    /// Values.
+    /// Number of values.
     pub n: usize,
-    /// Median, s.
+    /// Median, s; null without a value.
     pub p50_s: Option<f64>,
-    /// 90th percentile, s.
+    /// 90th percentile, s; null without a value.
     pub p90_s: Option<f64>,
-    /// Largest, s.
+    /// Largest, s; null without a value.
     pub max_s: Option<f64>,
 }
 

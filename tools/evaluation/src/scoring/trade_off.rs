@@ -10,6 +10,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_robot::Alarm;
 
@@ -21,13 +22,13 @@ use super::{Case, Spread, TIME_SLACK_S, Taxonomy, Verdict};
 const LEVELS: usize = 30;
 
 /// Detection of the faults of one class at one threshold.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ClassDetection {
-    /// Faults.
+    /// Number of faults.
     pub n: usize,
     /// Faults at or after whose onset the alarm rises; one that stands before is no detection.
     pub detected: usize,
-    /// Share of the others; null without a fault.
+    /// Share of the faults not detected; null without a fault.
     pub miss_rate: Option<f64>,
     /// Mean delay of the detected, s; null without one.
     pub delay_mean_s: Option<f64>,
@@ -50,7 +51,7 @@ impl ClassDetection {
 }
 
 /// One threshold.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Point {
     /// The alarm rises above these log-odds, nats.
     pub threshold_log_odds: f64,
@@ -64,7 +65,7 @@ pub struct Point {
 }
 
 /// Detection at all thresholds.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct TradeOff {
     /// The threshold that was set.
     pub configured: Point,

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_diagnosis::identify::IdentifierFilter;
 use vigil_evaluation::report::{Report, SensorSet};
@@ -19,7 +20,8 @@ use vigil_robot::RobotModel;
 use super::files::{check_place, write_whole};
 use super::labelled_runs::as_scored;
 use super::offline::{FilterArgs, OfflineModels};
-use document::{Document, filters_text};
+pub use document::Document;
+use document::filters_text;
 use passes::{Passes, SensorSetResult};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
@@ -60,8 +62,8 @@ fn filter_names() -> Vec<PossibleValue> {
     names.chain([PossibleValue::new("all")]).collect()
 }
 
-/// Part of the runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
+/// Part of the runs of the frames file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 enum Part {
     /// The runs that `vigil learn` left out.

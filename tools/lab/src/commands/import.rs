@@ -1,11 +1,12 @@
 //! `vigil import`: recordings of other programs as Vigil's frames.
 
-mod look;
-mod suggest;
+pub mod look;
+pub mod suggest;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_import::{self as import, LogDescription};
 use vigil_learning::plausibility;
@@ -39,38 +40,59 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Document {
+/// What it prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Name of the robot.
     robot: String,
+    /// Path of the frames written.
     frames: String,
+    /// Rate of the frames, Hz.
     rate_hz: f64,
+    /// Columns of the frames.
     columns: Vec<String>,
+    /// Channels that come late in the log.
     delays: Vec<DelayEstimate>,
+    /// Channels that measure the same as others, and how they read against these.
     agreements: Vec<Agreement>,
+    /// The runs, by number.
     runs: Vec<Run>,
 }
 
 /// How one channel reads against another that measures the same.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct Agreement {
+    /// The channel, or what follows from it.
     measured: String,
+    /// What it is compared with.
     against: String,
+    /// How many times the other it reads; by least squares, without a constant.
     ratio: f64,
+    /// Correlation without a constant, -1 to 1.
     correlation: f64,
 }
 
-#[derive(Debug, Serialize)]
+/// A channel that comes late.
+#[derive(Debug, Serialize, JsonSchema)]
 struct DelayEstimate {
+    /// The channel.
     channel: String,
+    /// By how much, s.
     delay_s: f64,
 }
 
-#[derive(Debug, Serialize)]
+/// A run of the frames.
+#[derive(Debug, Serialize, JsonSchema)]
 struct Run {
+    /// Its number.
     run: u32,
+    /// Where it comes from in the log.
     name: String,
+    /// Its frames.
     frames: usize,
+    /// Time of its last frame, s; its first is at 0.
     duration_s: f64,
     /// Clocks of its files that do not rise everywhere; their rows were put in order.
     disorder: Vec<DisorderCount>,
@@ -78,12 +100,18 @@ struct Run {
     repeated_rows: BTreeMap<String, usize>,
 }
 
-#[derive(Debug, Serialize)]
+/// A clock that does not rise everywhere.
+#[derive(Debug, Serialize, JsonSchema)]
 struct DisorderCount {
+    /// Path of the file.
     file: String,
+    /// Column of the clock.
     column: String,
+    /// Rows that are earlier than the one before.
     rows: usize,
+    /// The first of them; from 1, the header not counted.
     first_row: usize,
+    /// By how much the worst of them goes back, s.
     back_s: f64,
 }
 

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_import as import;
 use vigil_setup::{NAME_LENGTH_MAX, load_robot};
@@ -38,11 +39,16 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Document {
+/// What it prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Paths of the files written.
     files: Vec<String>,
+    /// What was guessed or left out, a sentence each: to be checked by hand.
     unsure: Vec<String>,
+    /// Commands that lead from here to a live diagnosis, in order.
     next: Vec<String>,
 }
 

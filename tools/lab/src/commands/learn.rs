@@ -4,6 +4,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use vigil_diagnosis::detect;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_learning::channel_learning;
 use vigil_learning::learning::further;
@@ -78,22 +79,33 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Shown<'a, V> {
+/// What `learn --show` prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ShownModel<'a, V> {
+    /// Version of this document.
     schema_version: u32,
+    /// Path of the model.
     model: String,
+    /// The model, readable.
     #[serde(flatten)]
     view: &'a V,
 }
 
-#[derive(Debug, Serialize)]
-struct Document<'a> {
+/// What `learn` prints with --json of a model with faults.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document<'a> {
+    /// Version of this document.
     schema_version: u32,
+    /// Path of the model written.
     model: String,
+    /// Hash of the model, as beliefs and reports carry it.
     model_hash: String,
+    /// Seed of the split.
     seed: u64,
+    /// What learning found.
     #[serde(flatten)]
     report: &'a Report,
+    /// Ids of the runs left out.
     held_out_run_ids: &'a [u32],
 }
 
@@ -138,7 +150,7 @@ fn print_view<V: Serialize + Display>(
     is_json: bool,
 ) -> Result<Outcome, CommandError> {
     let printed = if is_json {
-        output::json(&Shown {
+        output::json(&ShownModel {
             schema_version: 1,
             model: path.display().to_string(),
             view,

@@ -1,5 +1,6 @@
 //! `vigil learn` for any described robot: a model of its channels.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_evaluation::scoring::Score;
 use vigil_learning::channel_learning::Report;
@@ -11,14 +12,21 @@ use super::learn_task::{Task, held_out, learn};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
-#[derive(Debug, Serialize)]
-struct Document<'a> {
+/// What `learn` prints with --json of a model of channels.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document<'a> {
+    /// Version of this document.
     schema_version: u32,
+    /// Path of the model written.
     model: String,
+    /// Hash of the model, as beliefs and reports carry it.
     model_hash: String,
+    /// What was learned, and how well it holds.
     #[serde(flatten)]
     report: &'a Report,
+    /// Ids of the runs left out.
     held_out_run_ids: &'a [u32],
+    /// With --cross-validate: score of each group of runs, diagnosed by a model of the others.
     #[serde(skip_serializing_if = "Option::is_none")]
     cross_validation: Option<&'a Score>,
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::builder::PossibleValuesParser;
+use schemars::JsonSchema;
 use serde::de::IntoDeserializer;
 use serde::de::value::{Error as Refused, StrDeserializer};
 use serde::{Deserialize, Serialize};
@@ -119,13 +120,13 @@ pub struct FilterArgs {
 }
 
 /// What was used, for the record.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct FilterSettings {
     /// Hash of the learned model.
     pub model_hash: String,
     /// Hash of the fault tree.
     pub tree_hash: String,
-    /// Channels.
+    /// Set of channels: `pose` or `pose+encoders`.
     pub sensors: String,
     /// Form of the detection filter.
     pub detector: String,
@@ -133,7 +134,7 @@ pub struct FilterSettings {
     pub identifier: String,
     /// Most hypotheses of the identification filter, or its particles.
     pub particles: u32,
-    /// Seed.
+    /// Seed of the filters.
     pub seed: u64,
 }
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_blocks::OverallState;
 use vigil_cycle::topic::ServiceName;
@@ -51,51 +52,80 @@ fn factor(text: &str) -> Result<f64, String> {
 }
 
 /// What it prints with --json.
-#[derive(Debug, Serialize)]
-struct Document {
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Path of the recording.
     recording: String,
+    /// Name of the graph that was recorded.
     graph: String,
     /// True if answers of each service were compared, and nothing differs.
     identical: bool,
-    /// Time of the recording that was computed, s; and how many times as fast as it was.
+    /// Time of the recording that was computed, s.
     recorded_s: f64,
+    /// How many times as fast as it was.
     speed: f64,
+    /// True if the file was cut short.
     is_cut: bool,
-    /// Why the rest of the file cannot be read.
+    /// Why the rest of the file cannot be read; null if all of it was.
     damaged: Option<String>,
+    /// Blocks of another version, which nothing can be computed from.
     foreign_blocks: u64,
+    /// The services whose steps are computed.
     services: Vec<ComparedService>,
+    /// Up to 20 differences, by time; all are counted in `services`.
     differences: Vec<ListedDifference>,
+    /// Up to 20 gaps; all are counted in `services`.
     gaps: Vec<ListedGap>,
 }
 
-#[derive(Debug, Serialize)]
+/// What became of a service's answers.
+#[derive(Debug, Serialize, JsonSchema)]
 struct ComparedService {
+    /// Its name.
     service: &'static str,
+    /// Answers that the journal tells of.
     answers: u64,
+    /// Those that were computed again, and whose block was recorded.
     compared: u64,
+    /// Of these, the ones that are not the same to the last bit.
     different: u64,
+    /// Answers that were computed again, and whose block was not recorded.
     unrecorded: u64,
+    /// States that were compared with what was handed out.
     states: u64,
+    /// Times at which the service began to be computed: its start, or a state.
     begun: u64,
+    /// Gaps, after which it waits for its next start or state.
     gaps: u64,
 }
 
-#[derive(Debug, Serialize)]
+/// An answer or state that is not the same to the last bit.
+#[derive(Debug, Serialize, JsonSchema)]
 struct ListedDifference {
+    /// Name of the service.
     service: &'static str,
+    /// When it was recorded, s since 1970.
     t_unix_s: f64,
+    /// Sequence number of the recorded block; of the one before, for a state.
     block_seq: u64,
+    /// The field, with an array's index; of a state, from which byte on.
     field: String,
+    /// What was recorded.
     recorded: String,
+    /// What was computed.
     computed: String,
 }
 
-#[derive(Debug, Serialize)]
+/// Something that was not recorded.
+#[derive(Debug, Serialize, JsonSchema)]
 struct ListedGap {
+    /// Name of the service.
     service: &'static str,
+    /// When, s since 1970.
     t_unix_s: f64,
+    /// What is missing.
     what: String,
 }
 

@@ -9,6 +9,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_robot::Description;
 use vigil_robot::channel_model::context_change::{
@@ -45,7 +46,7 @@ pub struct LabelledChange<'a> {
 }
 
 /// What came of a context's runs.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ContextFit {
     /// Name of the context.
     pub context: String,
@@ -53,9 +54,9 @@ pub struct ContextFit {
     pub runs: usize,
     /// Those that show the step.
     pub runs_with_step: usize,
-    /// Groups of these.
+    /// Groups of the runs with a step.
     pub groups: usize,
-    /// Those told within a second by a signature that has not seen their group.
+    /// Runs told within a second by a signature that has not seen their group.
     pub runs_told: usize,
     /// True if the model tells the change.
     pub is_used: bool,

@@ -10,6 +10,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
@@ -61,22 +62,22 @@ struct Sample<'a> {
 }
 
 /// What came of a declared fault's runs.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct FaultFit {
     /// Name of the fault.
     pub fault: String,
-    /// Wheel with whose turns it comes back.
+    /// Wheel with whose turns it comes back; null if with none.
     pub wheel: Option<String>,
     /// Its runs.
     pub runs: usize,
     /// Those that show some healthy seconds, and then how the fault begins.
     pub runs_with_onset: usize,
-    /// Groups of these.
+    /// Groups of the runs with an onset.
     pub groups: usize,
     /// Runs that were looked for: parts of them, where all are of one group and come back with the
     /// turns of a wheel.
     pub parts: usize,
-    /// Those found by a signature that has not seen their group.
+    /// Those of them found by a signature that has not seen their group.
     pub runs_found: usize,
     /// True if the model recognizes the fault by its runs.
     pub is_used: bool,

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_robot::channel_model::{Channel, Model, Term};
 
@@ -17,26 +18,26 @@ use crate::learning::RESIDUAL_BAR;
 const ASTRAY: f64 = 0.05;
 
 /// One channel.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ChannelFit {
-    /// Channel.
+    /// Name of the channel.
     pub channel: String,
     /// Its unit.
     pub unit: String,
-    /// Deviation of one observation's residual at rest, in that unit.
+    /// Standard deviation of one observation's residual at rest, in that unit.
     pub residual_sd: f64,
-    /// Root mean square of its value in motion.
+    /// Root mean square of its value in motion, in that unit.
     pub usual: f64,
     /// Size of the residuals on parts left out, over that on parts learned from: 1 is the floor.
     pub held_out_ratio: f64,
 }
 
 /// Report of learning.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Report {
-    /// Runs learned from.
+    /// Number of runs learned from.
     pub runs_learned: usize,
-    /// Runs left out.
+    /// Number of runs left out.
     pub runs_held_out: usize,
     /// Time in motion, s.
     pub exposure_s: f64,
@@ -51,8 +52,7 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// Numbers of the model that stand on a bound set by hand.
     pub bounds: Bounds,
-    /// Which faults are detected and told apart; none if that was not asked for, or no window of
-    /// the log tells.
+    /// Which faults are detected and told apart; null if no window of the log tells.
     pub isolability: Option<Isolability>,
 }
 

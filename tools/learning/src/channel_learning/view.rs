@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_robot::channel_model::model::Tail;
 use vigil_robot::channel_model::{self, Model, Range};
@@ -10,7 +11,7 @@ use super::terms::word;
 use crate::model_view::{Alarm, Source};
 
 /// A model of channels, readable. `Display` prints it as text.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct View {
     /// What it is of, and where it comes from.
     #[serde(flatten)]
@@ -23,18 +24,18 @@ pub struct View {
     pub widened: f64,
     /// Axes of the command, and the ranges learned from.
     pub command: Vec<Range>,
-    /// Channels.
+    /// The channels, each with its prediction.
     pub channels: Vec<Channel>,
     /// Declared faults that are recognized by labelled runs.
     pub signatures: Vec<RecognizedFault>,
-    /// Tails of the classes of faults.
+    /// How often log-odds exceed a level without a fault, by class of faults.
     pub tails: Vec<Tail>,
     /// Alarm thresholds.
     pub alarms: Vec<Alarm>,
 }
 
 /// One channel.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Channel {
     /// The prediction in words.
     pub prediction: String,
@@ -44,11 +45,11 @@ pub struct Channel {
 }
 
 /// A declared fault that is recognized by labelled runs.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct RecognizedFault {
-    /// Its name.
+    /// Name of the fault.
     pub fault: String,
-    /// Runs that it was learned from.
+    /// Number of runs that it was learned from.
     pub runs: usize,
 }
 

@@ -1,5 +1,6 @@
 //! The model's error on runs that it has not seen.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_recording::frames::Run;
 use vigil_recording::labels::Label;
@@ -19,9 +20,9 @@ const SETTLED_S: f64 = 1.0;
 pub const RESIDUAL_BAR: f64 = 1.1;
 
 /// Root mean square error of one quantity predicted one interval ahead.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
 pub struct Residual {
-    /// Found, m or rad.
+    /// What was found, m or rad.
     pub rms: f64,
     /// The same relative to the sensor's noise.
     pub to_floor: f64,
@@ -34,13 +35,13 @@ pub struct Residual {
 }
 
 /// Error of one mode's motion model on runs left out, from one second after the start of a track.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ModeError {
-    /// Mode.
+    /// Name of the mode.
     pub mode: String,
-    /// Pieces of runs.
+    /// Number of pieces of runs.
     pub segments: usize,
-    /// Poses predicted.
+    /// Number of poses predicted.
     pub poses: usize,
     /// Root mean square error of the position predicted one interval ahead, per axis, m.
     pub position_rms_m: f64,
@@ -54,11 +55,11 @@ pub struct ModeError {
     pub position: Residual,
     /// Yaw in detail, rad.
     pub yaw: Residual,
-    /// Yaw in left turns; absent without any.
+    /// Yaw in left turns; null without any.
     pub yaw_left: Option<Residual>,
-    /// Yaw in right turns; absent without any.
+    /// Yaw in right turns; null without any.
     pub yaw_right: Option<Residual>,
-    /// Mean log-likelihood of a pose.
+    /// Mean log-likelihood of a pose, nats.
     pub log_likelihood: f64,
 }
 
@@ -71,11 +72,11 @@ impl ModeError {
 }
 
 /// What learning found.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Report {
-    /// Runs learned from.
+    /// Number of runs learned from.
     pub runs_learned: usize,
-    /// Runs left out.
+    /// Number of runs left out.
     pub runs_held_out: usize,
     /// Nominal driving behind the alarm's calibration, h.
     pub exposure_h: f64,

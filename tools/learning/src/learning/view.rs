@@ -2,6 +2,7 @@
 
 use std::fmt::{self, Write as _};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_robot::learned::model::{CommandModel, Noise};
 use vigil_robot::learned::{Curve, EncoderModel, Model, MotionModel, RateModel};
@@ -12,7 +13,7 @@ use crate::model_view::{Alarm, Source};
 const RADII_M: [f64; 10] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0];
 
 /// A learned model, readable. `Display` prints it as text.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct View {
     /// What it is of, and where it comes from.
     #[serde(flatten)]
@@ -36,9 +37,9 @@ pub struct View {
 }
 
 /// One mode.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Mode {
-    /// Name.
+    /// Name of the mode.
     pub mode: String,
     /// Motion per commanded metre, with its noise.
     pub motion: MotionModel,
@@ -47,7 +48,7 @@ pub struct Mode {
 }
 
 /// Change of the heading rate on one circle.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct HeadingRate {
     /// `left` or `right`.
     pub turn: &'static str,

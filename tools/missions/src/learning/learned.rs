@@ -5,16 +5,16 @@ use statrs::distribution::{Beta, ContinuousCDF};
 use super::layout::{Layout, Row};
 use vigil_pomdp::Pomdp;
 
-/// Where an iteration began.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+/// An iteration of learning, as it began.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, schemars::JsonSchema)]
 pub struct Iteration {
-    /// Start, from 0.
+    /// Number of the start, from 0.
     pub start: usize,
-    /// Iteration, from 0.
+    /// Number of the iteration, from 0.
     pub iteration: usize,
-    /// sum ln c over all missions, nats.
+    /// Log-likelihood of all missions, nats.
     pub log_likelihood: f64,
-    /// sum ln c + sum kappa ln theta: what rises.
+    /// Log-likelihood with the logarithm of the prior, nats; it rises with each iteration.
     pub objective: f64,
 }
 

@@ -2,6 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{JudgedTime, Onset, Run};
@@ -16,31 +17,31 @@ const DRAWS: usize = 400;
 const SOON_S: f64 = 2.0;
 
 /// The run that is worst in a figure.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Worst {
-    /// Its value; missing where something never happened.
+    /// Its value; null where something never happened.
     pub value: Option<f64>,
-    /// The run.
+    /// Number of the run: its id, or the seed of a simulated one.
     pub seed: u64,
 }
 
 /// A figure over all runs.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Figure {
     /// Its name; the unit is last. Documents have it as their key.
     #[serde(skip)]
     pub name: &'static str,
-    /// Its value; missing where something never happened.
+    /// Its value; null where something never happened.
     pub value: Option<f64>,
-    /// Bounds that cover the true value with 95 %: exact ones of counts and of shares of cases;
-    /// those of a mean over runs, by Student's distribution, for shares of time, times and log
-    /// scores; those of a bootstrap over runs for a calibration error.
+    /// Lower end of bounds that cover the true value with 95 %. Those of counts and of shares of
+    /// cases are exact. Those of shares of time, times and log scores are of a mean over runs, by
+    /// Student's distribution; those of a calibration error are of a bootstrap over runs.
     pub lower_95: Option<f64>,
-    /// See `lower_95`.
+    /// Upper end of the same bounds.
     pub upper_95: Option<f64>,
     /// Cases behind it: runs, onsets, ends or events.
     pub n: usize,
-    /// The worst run.
+    /// The worst run; null if no single run has this figure.
     pub worst: Option<Worst>,
 }
 

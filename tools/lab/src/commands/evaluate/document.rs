@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_evaluation::scoring::bounds::Difference;
 use vigil_evaluation::scoring::{Contest, Score, Share};
@@ -11,13 +12,18 @@ use super::Part;
 use super::passes::SensorSetResult;
 use crate::commands::offline::FilterSettings;
 
-/// The document. Keys of the score stand at its top, for the set of channels that was asked for.
-#[derive(Debug, Serialize)]
+/// What it prints with --json. Keys of the score stand at its top, for the set of channels that
+/// was asked for.
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Document<'a> {
+    /// Version of this document.
     schema_version: u32,
+    /// Part of the runs that was scored.
     part: Part,
+    /// What was used.
     #[serde(flatten)]
     used: &'a FilterSettings,
+    /// How good the verdicts are.
     #[serde(flatten)]
     score: &'a Score,
     /// The scores of all sets of channels, if a report or filters were asked for.
@@ -30,7 +36,7 @@ pub struct Document<'a> {
 
 impl<'a> Document<'a> {
     /// Of the set that was `asked` for and of all sets `found`, which count if there are `several`.
-    pub fn new(
+    pub(super) fn new(
         part: Part,
         used: &'a FilterSettings,
         asked: &'a SensorSetResult,

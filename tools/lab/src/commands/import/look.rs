@@ -2,33 +2,50 @@
 
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_import::{self as import, SurveyTable, Values};
 use vigil_terminal::{CommandError, Outcome, output};
 
-#[derive(Debug, Serialize)]
-struct Document {
+/// What `import --look` prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Path of the log.
     log: String,
+    /// Its topics or files, by name.
     tables: Vec<Table>,
 }
 
-#[derive(Debug, Serialize)]
+/// A topic or file.
+#[derive(Debug, Serialize, JsonSchema)]
 struct Table {
+    /// Topic, or path of the file.
     name: String,
+    /// Type of the messages; empty for a file.
     #[serde(rename = "type")]
     kind: String,
+    /// Messages or rows.
     rows: usize,
+    /// Their rate, Hz; null if no clock tells it.
     rate_hz: Option<f64>,
+    /// Why it cannot be read; null if it can.
     problem: Option<String>,
+    /// Columns that hold a number somewhere.
     columns: Vec<Column>,
 }
 
-#[derive(Debug, Serialize)]
+/// A column, or a number within a message.
+#[derive(Debug, Serialize, JsonSchema)]
 struct Column {
+    /// Name, or path within the message.
     name: String,
+    /// Rows that hold a number.
     values: usize,
+    /// Smallest; null if there is none.
     min: Option<f64>,
+    /// Largest; null if there is none.
     max: Option<f64>,
 }
 

@@ -2,18 +2,25 @@
 
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_import as import;
 use vigil_terminal::{CommandError, Outcome, output};
 
 use crate::commands::files::{check_place, write_whole};
 
-#[derive(Debug, Serialize)]
-struct Document {
+/// What `import --suggest` prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Path of the written description of the log.
     log: String,
+    /// Path of the written description of the robot.
     robot: String,
+    /// Folder of the log, as `import --from` takes it.
     from: String,
+    /// What was guessed or left out, a sentence each: to be checked by hand.
     unsure: Vec<String>,
 }
 

@@ -16,6 +16,7 @@ use vigil_pomdp::{PointBased, Pomdp, mdp};
 use super::escalation::EscalationArgs;
 use super::planner::PlannerArgs;
 use super::{load, print, solved};
+pub use contest::Document;
 use contest::{Contest, Setting};
 use contestant::{Contestant, Kind, Knowledge};
 use vigil_terminal::{CommandError, Outcome};

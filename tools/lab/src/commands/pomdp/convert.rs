@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{load, save};
@@ -24,13 +25,20 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Document {
+/// What it prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Path of the model read.
     file: String,
+    /// Path of the model written.
     out: String,
+    /// Hash of the model, which both files have.
     hash: String,
+    /// Size of what was written, bytes.
     bytes: usize,
+    /// What is doubtful in the model, each with its place.
     warnings: Vec<String>,
 }
 

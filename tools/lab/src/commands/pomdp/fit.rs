@@ -3,6 +3,7 @@
 use std::fmt::Display;
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use vigil_missions::learning::{Record, file};
@@ -36,14 +37,22 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Document {
+/// What it prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Path of the parameters read.
     parameters_file: String,
+    /// Path of the missions.
     missions_file: String,
+    /// Missions read.
     missions: usize,
+    /// Steps that were counted: those whose true states are known.
     steps: usize,
+    /// Visits that a number in the file counts as.
     prior_strength: f64,
+    /// The fitted numbers, in the order of the file.
     chances: Vec<FittedChance>,
 }
 

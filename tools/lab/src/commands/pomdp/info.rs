@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_pomdp::Pomdp;
 
@@ -20,39 +21,65 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Document {
+/// What it prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Path of the model.
     file: String,
+    /// Hash of the model.
     hash: String,
+    /// Discount of a step.
     discount: f64,
+    /// What the file holds: `reward` or `cost`. Costs count as negative rewards here.
     values: &'static str,
+    /// Names of the states.
     states: Vec<String>,
+    /// Names of the actions.
     actions: Vec<String>,
+    /// Names of the observations.
     observations: Vec<String>,
+    /// Start belief, by state.
     start: Vec<f64>,
+    /// Number of states that some sequence of actions may lead to from the start.
     reachable_states: usize,
+    /// Names of the other states.
     unreachable: Vec<String>,
+    /// Number of transition probabilities other than 0.
     transition_entries: usize,
+    /// What observations tell.
     observation: Observation,
+    /// Smallest expected reward of an action in a state.
     reward_min: f64,
+    /// Largest expected reward of an action in a state.
     reward_max: f64,
+    /// True if a reward depends on the next state or on the observation.
     rewards_depend_on_outcome: bool,
+    /// What is doubtful in the file.
     warnings: Vec<Warning>,
 }
 
-#[derive(Debug, Serialize)]
+/// What observations tell.
+#[derive(Debug, Serialize, JsonSchema)]
 struct Observation {
-    /// `none`, `state`, `per_state`, `noisy` or `blind`, see [`structure`].
+    /// `none`: there are none. `state`: each tells the state. `per_state`: states share them.
+    /// `noisy`: they come by chance. `blind`: they tell nothing.
     structure: &'static str,
+    /// Number of observation probabilities other than 0.
     entries: usize,
+    /// True if they are not the same after each action.
     depends_on_action: bool,
 }
 
-#[derive(Debug, Serialize)]
+/// Something doubtful in the file.
+#[derive(Debug, Serialize, JsonSchema)]
 struct Warning {
+    /// Its line, from 1.
     line: usize,
+    /// Its column, from 1.
     column: usize,
+    /// What it is.
     message: String,
 }
 

@@ -14,7 +14,8 @@ use vigil_pomdp::{Pomdp, mdp};
 
 use super::compare::{count, fits};
 use super::{load, print, save, seed};
-use document::{Document, Mean};
+pub use document::Document;
+use document::Mean;
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 

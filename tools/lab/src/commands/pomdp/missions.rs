@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use vigil_missions::learning::{Record, file};
 use vigil_pomdp::Pomdp;
@@ -59,14 +60,20 @@ struct Step {
     observation: Option<String>,
 }
 
-#[derive(Debug, Default, Serialize)]
-struct Document {
+/// What it prints with --json.
+#[derive(Debug, Default, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Runs read.
     runs: usize,
+    /// Missions written.
     missions: usize,
+    /// Their steps.
     steps: usize,
-    /// Steps after one that is missing or that the model cannot observe.
+    /// Steps left out: they follow one that is missing or that the model cannot observe.
     left_out: usize,
+    /// Path of the missions.
     out: String,
 }
 

@@ -1,22 +1,22 @@
 //! `vigil pomdp`: what can be done with a decision model, one command a module.
 
-mod compare;
-mod convert;
+pub mod compare;
+pub mod convert;
 mod escalation;
-mod fit;
+pub mod fit;
 mod generate;
-mod info;
-mod learn;
-mod missions;
+pub mod info;
+pub mod learn;
+pub mod missions;
 mod parameters;
 mod picture;
 mod planner;
 mod seed;
 mod simulate;
-mod solve;
+pub mod solve;
 mod solved;
-mod track;
-mod value;
+pub mod track;
+pub mod value;
 
 use std::path::Path;
 

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_cycle::clock::process_cpu_s;
 use vigil_cycle::signal;
@@ -75,29 +76,46 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Document {
+/// What it prints with --json. Bounds are of the best value at the start belief.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Path of the model.
     file: String,
+    /// Hash of the model.
     model_hash: String,
+    /// Method: `mdp`, `blind`, `qmdp`, `fib`, `tib` or `sarsop`.
     method: String,
+    /// Discount of a step.
     discount: f64,
-    /// What the file holds; bounds are rewards in any case, costs negative.
+    /// What the file holds: `reward` or `cost`. Bounds are rewards in any case, costs negative.
     values: &'static str,
+    /// Lower bound; null if the method gives none.
     lower: Option<f64>,
+    /// Upper bound; null if the method gives none.
     upper: Option<f64>,
+    /// Upper minus lower bound; null without both.
     gap: Option<f64>,
-    /// gap over the larger of the bounds' magnitudes.
+    /// Gap over the larger of the bounds' magnitudes; null without both.
     gap_relative: Option<f64>,
+    /// Processor time, s.
     cpu_s: f64,
+    /// What ended it: `precision`, `memory`, `timeout` or `interrupted`.
     ended: &'static str,
+    /// Rounds of the search of `sarsop`; 0 of other methods.
     rounds: usize,
+    /// Beliefs that the search reached.
     beliefs: usize,
+    /// Points of the upper bound of `sarsop`.
     points: usize,
+    /// Vectors of the lower bound; 0 without one.
     vectors: usize,
+    /// Path of the policy written; null without --out.
     policy: Option<String>,
+    /// Its vectors; null without --out.
     policy_vectors: Option<usize>,
-    /// What the policy earns at least; what its fewer vectors lose is sampled.
+    /// What it earns at least; what its fewer vectors lose is sampled. Null without --out.
     policy_lower: Option<f64>,
 }
 

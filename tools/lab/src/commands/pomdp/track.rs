@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_missions::learning::file::index_of;
 use vigil_pomdp::policy::Policy;
@@ -32,42 +33,58 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Document {
+/// What it prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Path of the model.
     file: String,
+    /// Hash of the model.
     hash: String,
+    /// Names of the states.
     states: Vec<String>,
+    /// Names of the actions.
     actions: Vec<String>,
+    /// Start belief, by state.
     start: Vec<f64>,
     /// What the policy does at the start; null without one.
     start_decision: Option<Decision>,
+    /// The steps, in order.
     steps: Vec<Step>,
+    /// Number of steps whose observation the model rules out.
     impossible_steps: usize,
-    /// Of all steps; null if one was impossible.
+    /// Log-likelihood of all observations, nats; null if one was impossible.
     log_likelihood: Option<f64>,
 }
 
-#[derive(Debug, Serialize)]
+/// An action, an observation, and the belief after them.
+#[derive(Debug, Serialize, JsonSchema)]
 struct Step {
+    /// Name of the action.
     action: String,
+    /// Name of the observation.
     observation: String,
+    /// Belief after the step, by state.
     belief: Vec<f64>,
-    /// p(z|a,b) before the step; 0 if it was impossible.
+    /// Probability of the observation, given the belief before and the action; 0 if impossible.
     probability: f64,
+    /// True if the model rules the observation out.
     impossible: bool,
+    /// Entropy of the belief over that of the uniform one: 0 certain, 1 uniform.
     entropy: f64,
     /// What the policy does next; null without one.
     decision: Option<Decision>,
 }
 
 /// What a policy does at a belief.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct Decision {
+    /// Name of the action.
     action: String,
-    /// Its value minus the runner-up's.
+    /// Its value minus the runner-up's, in units of reward.
     margin: f64,
-    /// What it thinks of each action.
+    /// Value of each action by the policy, in units of reward.
     values: Vec<f64>,
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_cycle::signal;
 use vigil_missions::simulation::{Episode, PolicyAgent, Rules, Summary, run as drive};
@@ -42,25 +43,39 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Document {
+/// What it prints with --json. Values are discounted rewards from the start belief on.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of this document.
     schema_version: u32,
+    /// Path of the model.
     file: String,
+    /// Hash of the model.
     model_hash: String,
+    /// Path of the policy.
     policy: String,
-    /// Bounds that hold for certain; null if there is none.
+    /// The policy earns at least this, for certain; null if there is no such bound.
+    // JSON has no infinity.
+    #[schemars(with = "Option<f64>")]
     lower: f64,
+    /// The policy earns at most this, for certain; null if there is no such bound.
+    #[schemars(with = "Option<f64>")]
     upper: f64,
-    /// Beliefs that were gone through.
+    /// Beliefs that were gone through for the bounds.
     beliefs: usize,
-    /// Discounted share of the time that is spent beyond them.
+    /// Discounted share of the time that is spent beyond them; with discount 1 a probability.
     beyond_share: f64,
+    /// Missions sampled.
     episodes: u64,
+    /// Seed of the missions.
     seed: u64,
-    /// Steps after which a sampled mission is cut off, and what then is left of the discount.
+    /// Steps after which a sampled mission is cut off.
     steps_max: usize,
+    /// What is left of the discount then.
     weight_beyond_horizon: f64,
+    /// Mean of the sampled missions.
     mean: f64,
+    /// The mean's 95 % interval is `mean` +- this.
     half_width_95: f64,
 }
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_robot::channel_model::{AXES, Range};
 
@@ -20,21 +21,21 @@ const SIZE: usize = 11;
 const CELL: usize = 18;
 
 /// A fault of a stated size.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct FaultReport {
-    /// Component.
+    /// Component that the fault is of.
     pub component: String,
     /// What of it is broken: of a pose a channel, else the component.
     pub broken: String,
-    /// How.
+    /// How it is broken.
     pub kind: &'static str,
-    /// Size; none where the kind has none. Of a drive the share that is lost or added.
+    /// Size; null where the kind has none. Of a drive the share that is lost or added.
     pub size: Option<f64>,
     /// Its unit; empty for a gain and a share.
     pub size_unit: String,
     /// Share of the log's motion that shows it within four seconds.
     pub shown_share: f64,
-    /// Expected wait for an alarm from an onset on; none if the log's motion does not show it.
+    /// Expected wait for an alarm from an onset on; null if the log's motion does not show it.
     pub detected_after: Option<Waits>,
     /// Channels that carry it, the most important first.
     pub channels: Vec<String>,
@@ -43,20 +44,20 @@ pub struct FaultReport {
 }
 
 /// Two faults that only few motions tell apart.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct PairReport {
-    /// The two.
+    /// Names of the two.
     pub pair: Pair,
     /// Share of the windows that show one of them in which the other is excluded.
     pub told_share: f64,
-    /// Expected wait until then.
+    /// Expected wait until they are told apart; null if no window tells them.
     pub told_after: Option<Waits>,
     /// Channels that separate them, the most important first.
     pub channels: Vec<String>,
 }
 
 /// A sensor that the robot lacks.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Sensor {
     /// What it measures.
     pub sensor: String,
@@ -65,13 +66,13 @@ pub struct Sensor {
 }
 
 /// One axis of a command.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct AxisCommand {
-    /// Name.
+    /// Name of the axis.
     pub axis: String,
-    /// Value.
+    /// Commanded value, in its unit.
     pub value: f64,
-    /// Unit.
+    /// Its unit.
     pub unit: String,
 }
 
@@ -89,9 +90,9 @@ impl AxisCommand {
 }
 
 /// A command kept up from rest on.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct TestDrive {
-    /// The command.
+    /// The command, by axis.
     pub command: Vec<AxisCommand>,
     /// For how long, s.
     pub duration_s: f64,
@@ -100,13 +101,13 @@ pub struct TestDrive {
 }
 
 /// Which faults are detected, and told apart.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Isolability {
     /// Mean time between false alarms, h.
     pub false_alarm_interval_h: f64,
     /// Windows of the log that were looked at.
     pub windows: usize,
-    /// All faults.
+    /// The faults that were looked at.
     pub faults: Vec<FaultReport>,
     /// Sets of faults of which no two are told apart.
     pub groups: Vec<Vec<String>>,

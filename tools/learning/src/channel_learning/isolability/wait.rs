@@ -1,25 +1,26 @@
 //! How long and how far a robot drives until a fault shows.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_robot::channel_model::law::BLOCK_S;
 
 use super::snapshot::{Place, Snapshot};
 
 /// Time and way from an onset on.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Wait {
-    /// Motion, s.
+    /// Time in motion, s.
     pub motion_s: f64,
-    /// Way, m; none if nothing tells the robot's speed.
+    /// Way, m; null if nothing tells the robot's speed.
     pub way_m: Option<f64>,
 }
 
 /// The wait that half of all onsets, and nine of ten, do not exceed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Waits {
-    /// Of half of the onsets.
+    /// The wait that half of the onsets do not exceed.
     pub half: Wait,
-    /// Of nine of ten.
+    /// The wait that nine of ten do not exceed.
     pub nine_of_ten: Wait,
 }
 

@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
+use schemars::JsonSchema;
 use serde::Serialize;
-use serde_json::{Value, json};
 use vigil_missions::simulation::{
     Act, Agent, Episode, Mission, PairedDifference, Rules, Summary, run,
 };
@@ -31,6 +31,52 @@ pub struct Setting<'a> {
     pub against: usize,
 }
 
+/// What it prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document<'a> {
+    /// Version of this document.
+    schema_version: u32,
+    /// Path of the model that the policies believe in.
+    file: &'a str,
+    /// Hash of that model.
+    model_hash: String,
+    /// Hash of the model that plays the world; the same without --model-error.
+    world_hash: String,
+    /// Discount of a step.
+    discount: f64,
+    /// Missions of each policy.
+    episodes: u64,
+    /// Seed of the missions.
+    seed: u64,
+    /// Greatest number of steps of a mission.
+    steps_max: usize,
+    /// What is left of the discount then.
+    weight_beyond_horizon: f64,
+    /// Actions that end a mission.
+    ends: Vec<&'a str>,
+    /// Actions that dual control may take to gain information.
+    information_actions: Vec<&'a str>,
+    /// Steps without falling entropy after which dual control gathers no more; 0: never.
+    stall_guard_steps: u32,
+    /// Upper bound of the value at the start belief; null if actions end missions.
+    upper: Option<f64>,
+    /// Where that is from: `given`, `point-based solver` or `fast informed bound`; null without it.
+    upper_from: Option<&'static str>,
+    /// The policy that each row is compared with.
+    against: Reference<'a>,
+    /// The policies, in the order of --policies.
+    rows: &'a [Row],
+}
+
+/// A policy that others are compared with.
+#[derive(Debug, Serialize, JsonSchema)]
+struct Reference<'a> {
+    /// Name of the policy.
+    policy: &'a str,
+    /// K of dual control; null without it.
+    threshold: Option<f64>,
+}
+
 /// What came out, one row a contestant.
 pub struct Contest {
     /// In the order of the contestants.
@@ -38,13 +84,13 @@ pub struct Contest {
 }
 
 /// What one contestant did.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Row {
     /// Name of the policy.
     pub policy: String,
     /// K of dual control; null without it.
     pub threshold: Option<f64>,
-    /// Mean of the discounted rewards.
+    /// Mean of the discounted rewards of a mission.
     pub mean: f64,
     /// The mean's 95 % interval is `mean` +- this.
     pub half_width_95: f64,
@@ -56,31 +102,31 @@ pub struct Row {
     pub regret: Option<f64>,
     /// Mean of the undiscounted rewards.
     pub undiscounted_mean: f64,
-    /// Its 95 % half-width.
+    /// The undiscounted mean's 95 % interval is that mean +- this.
     pub undiscounted_half_width_95: f64,
     /// Steps of a mission, mean.
     pub steps_mean: f64,
     /// Share of missions that an action ended.
     pub ended_share: f64,
-    /// Share of steps taken for information.
+    /// Share of steps that dual control took for information.
     pub dual_share: f64,
     /// Share of steps in which gathering information had stalled.
     pub stalled_share: f64,
-    /// Observations that were impossible in its eyes, all missions.
+    /// Observations of all missions that the model which it believes in rules out.
     pub impossible: usize,
     /// Time of a decision without the belief's update, median, ns.
     pub decision_p50_ns: f64,
-    /// The same, 99 % quantile, ns.
+    /// Time of a decision without the belief's update, 99 % quantile, ns.
     pub decision_p99_ns: f64,
-    /// Paired difference to the reference: mean.
+    /// Mean difference to the policy of `against`, mission by mission.
     pub difference: f64,
-    /// Its 95 % half-width.
+    /// The difference's 95 % interval is `difference` +- this.
     pub difference_half_width_95: f64,
     /// Probability of such a difference by chance (paired t-test, two-sided).
     pub difference_p: f64,
     /// True for the largest mean.
     pub is_best: bool,
-    /// True if its paired difference to the best is within its 95 % interval.
+    /// True if its paired difference to the best is not told from 0 (95 %).
     pub is_like_best: bool,
 }
 
@@ -119,31 +165,37 @@ impl Contest {
     }
 
     /// As one JSON document.
-    pub fn document(&self, setting: &Setting<'_>, of: &Knowledge<'_>, file: &str) -> Value {
+    pub fn document<'a>(
+        &'a self,
+        setting: &Setting<'a>,
+        of: &'a Knowledge<'_>,
+        file: &'a str,
+    ) -> Document<'a> {
         let discount = setting.world.discount();
         let against = &self.rows[setting.against];
         let ends = setting.world.actions().iter().zip(&setting.rules.is_end);
-        let ends: Vec<&String> = ends
-            .filter(|(_, is_end)| **is_end)
-            .map(|(a, _)| a)
-            .collect();
-        json!({
-            "file": file,
-            "model_hash": format!("{:016x}", of.model.hash()),
-            "world_hash": format!("{:016x}", setting.world.hash()),
-            "discount": discount,
-            "episodes": setting.episodes,
-            "seed": setting.seed,
-            "steps_max": setting.rules.steps_max,
-            "weight_beyond_horizon": discount.powi(setting.rules.steps_max as i32),
-            "ends": ends,
-            "information_actions": of.information_actions(),
-            "stall_guard_steps": of.stall_steps,
-            "upper": setting.upper.as_ref().map(|upper| upper.value),
-            "upper_from": setting.upper.as_ref().map(|upper| upper.from),
-            "against": {"policy": against.policy, "threshold": against.threshold},
-            "rows": self.rows,
-        })
+        let ends = ends.filter(|(_, is_end)| **is_end);
+        Document {
+            schema_version: 1,
+            file,
+            model_hash: format!("{:016x}", of.model.hash()),
+            world_hash: format!("{:016x}", setting.world.hash()),
+            discount,
+            episodes: setting.episodes,
+            seed: setting.seed,
+            steps_max: setting.rules.steps_max,
+            weight_beyond_horizon: discount.powi(setting.rules.steps_max as i32),
+            ends: ends.map(|(action, _)| action.as_str()).collect(),
+            information_actions: of.information_actions(),
+            stall_guard_steps: of.stall_steps,
+            upper: setting.upper.as_ref().map(|upper| upper.value),
+            upper_from: setting.upper.as_ref().map(|upper| upper.from),
+            against: Reference {
+                policy: &against.policy,
+                threshold: against.threshold,
+            },
+            rows: &self.rows,
+        }
     }
 }
 

@@ -2,24 +2,25 @@
 
 use std::fmt::Write;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_missions::learning::{Iteration, LearnedModel, LearnedRow, Table};
 use vigil_missions::simulation::Summary;
 
-/// What the command prints.
-#[derive(Debug, Serialize)]
+/// What it prints with --json.
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Document {
-    /// Of this document.
+    /// Version of this document.
     pub schema_version: u32,
-    /// Model made by hand.
+    /// Path of the model made by hand.
     pub file: String,
-    /// Recorded missions.
+    /// Path of the recorded missions.
     pub missions_file: String,
-    /// Their number.
+    /// Number of recorded missions.
     pub missions: usize,
     /// All their steps.
     pub steps: usize,
-    /// Rule by which they were flown, as their file says.
+    /// Policy by which they were recorded, as their file says; null if it does not.
     pub flown_by: Option<String>,
     /// Visits that each row of the model made by hand counts as.
     pub prior_strength: f64,
@@ -29,17 +30,17 @@ pub struct Document {
     pub iterations: Vec<Iteration>,
     /// The start belief and every row of T and Z.
     pub rows: Vec<Row>,
-    /// Policy of the learned model.
+    /// Policy of the learned model whose reward is predicted.
     pub policy: String,
-    /// Simulated missions.
+    /// Missions simulated for the prediction.
     pub episodes: u64,
-    /// Its worth by the learned model.
+    /// Reward of the policy by the learned model.
     pub predicted: Mean,
-    /// Its worth in the world that was given.
+    /// Reward of the policy in the world of --world; null without one.
     pub measured: Option<Mean>,
-    /// What the learned model expects of the recorded missions.
+    /// Reward of the recorded missions by the learned model; null if they hold no rewards.
     pub logged_predicted: Option<Mean>,
-    /// What they brought.
+    /// Recorded reward of the recorded missions; null if they hold no rewards.
     pub logged_measured: Option<Mean>,
     /// Whether there was anything to check by: rewards of missions, or a world.
     pub is_checked: bool,
@@ -47,16 +48,20 @@ pub struct Document {
     pub is_weakly_checked: bool,
     /// Whether the file to be written is there all the same: from before.
     pub is_older_out_left: bool,
-    /// Why the model is not to be deployed.
+    /// Why the model is not to be deployed; null if it was written.
     pub refused: Option<String>,
     /// Hash of the learned model.
     pub hash: String,
 }
 
 /// Discounted reward of a mission.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Mean {
+    /// Mean over missions.
     mean: f64,
+    /// The mean's 95 % interval is `mean` +- this; null for a single mission.
+    // JSON has no infinity.
+    #[schemars(with = "Option<f64>")]
     half_width_95: f64,
 }
 
@@ -71,27 +76,38 @@ impl Mean {
 }
 
 /// A learned row.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Row {
-    /// `start`, `T` or `O`.
+    /// What it is of: `start` (start belief), `T` (transitions) or `O` (observations).
     table: &'static str,
+    /// Name of the action; null for the start belief.
     action: Option<String>,
+    /// Name of the state: before the action for `T`, after it for `O`; null for the start belief.
     state: Option<String>,
+    /// Expected visits in the missions.
     visits: f64,
+    /// Visits that the model made by hand counts as.
     prior: f64,
+    /// Visits in the missions over the sum of both, 0 to 1.
     data_share: f64,
+    /// Its probabilities, but for those that the model made by hand rules out.
     entries: Vec<Entry>,
 }
 
 /// A learned probability.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct Entry {
+    /// State or observation that it is the probability of.
     name: String,
+    /// In the model made by hand.
     prior: f64,
+    /// Learned.
     learned: f64,
-    /// 95 % of the worlds that the prior expects lie between these; fewer if the prior is off.
+    /// Lower end of the 95 % credible interval, which holds fewer worlds if the prior is off.
     credible_low: f64,
+    /// Upper end of the same interval.
     credible_high: f64,
+    /// Visits that the missions are worth for this number; fewer, the harder states are to tell.
     effective_visits: f64,
 }
 
