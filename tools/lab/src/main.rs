@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use vigil_terminal::exit_code;
 
-use commands::{diagnose, evaluate, import, init, learn, pomdp, replay, report};
+use commands::{diagnose, evaluate, import, init, learn, pomdp, replay, report, schema};
 
 /// Learns models, imports logs, diagnoses and scores recorded runs, solves decision models.
 ///
@@ -29,6 +29,7 @@ enum Command {
     Report(report::Args),
     Replay(replay::Args),
     Pomdp(pomdp::Args),
+    Schema(schema::Args),
 }
 
 fn main() -> ExitCode {
@@ -41,5 +42,6 @@ fn main() -> ExitCode {
         Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Pomdp(args) => pomdp::run(&args),
+        Command::Schema(args) => schema::run(&args),
     })
 }

@@ -2,5 +2,6 @@
 
 mod ending;
 pub mod output;
+pub mod schema;
 
 pub use ending::{CommandError, Outcome, exit_code};

@@ -27,6 +27,30 @@ const COMMANDS: [(&str, &str); 8] = [
     ),
 ];
 
+/// Its documents that have a schema: `vigil-lab schema` prints it. Here, they can be listed without
+/// building that program.
+pub const SCHEMAS: [&str; 19] = [
+    "init",
+    "import",
+    "import-look",
+    "import-suggest",
+    "learn",
+    "learn-channels",
+    "learn-show",
+    "learn-show-channels",
+    "evaluate",
+    "replay",
+    "pomdp-compare",
+    "pomdp-convert",
+    "pomdp-fit",
+    "pomdp-info",
+    "pomdp-learn",
+    "pomdp-missions",
+    "pomdp-solve",
+    "pomdp-track",
+    "pomdp-value",
+];
+
 /// What the help says of them.
 pub fn help() -> String {
     let mut text = format!("Commands of {PROGRAM}, built by `cargo build --release`:\n");
@@ -36,7 +60,7 @@ pub fn help() -> String {
     text
 }
 
-/// Becomes `vigil-lab` with these words.
+/// Becomes `vigil-lab` with a command of its own, and these words.
 ///
 /// # Errors
 /// A command that neither program has; a program that is not built.
@@ -49,6 +73,14 @@ pub fn run(words: &[OsString]) -> Result<Outcome, CommandError> {
         let message = format!("'{command}' is no command; `vigil --help` lists them");
         return Err(CommandError::usage(message));
     }
+    start(words)
+}
+
+/// Becomes `vigil-lab` with these words, whether its command is one of those listed or not.
+///
+/// # Errors
+/// A program that is not built.
+pub fn start(words: &[OsString]) -> Result<Outcome, CommandError> {
     let program = beside::Program {
         name: PROGRAM,
         build: "-p vigil-lab",
@@ -60,7 +92,7 @@ pub fn run(words: &[OsString]) -> Result<Outcome, CommandError> {
 mod tests {
     use std::path::Path;
 
-    use super::COMMANDS;
+    use super::{COMMANDS, SCHEMAS};
 
     /// A file of the repository.
     fn read(path: &str) -> String {
@@ -70,7 +102,9 @@ mod tests {
 
     #[test]
     fn the_laboratory_its_page_and_this_list_have_the_same_commands() {
-        let listed = COMMANDS.map(|(name, _)| name);
+        let listed = COMMANDS.iter().map(|(name, _)| *name);
+        // `vigil` has a command of that name, too, which starts the laboratory's.
+        let listed: Vec<&str> = listed.chain(["schema"]).collect();
 
         let program = read("tools/lab/src/main.rs");
         let (_, after) = program.split_once("enum Command {\n").unwrap();
@@ -90,5 +124,14 @@ mod tests {
             let row = format!("\n| `target/release/vigil {name} ");
             assert!(commands.contains(&row), "docs/commands.md lacks {name}");
         }
+    }
+
+    #[test]
+    fn the_laboratory_and_this_list_have_the_same_schemas() {
+        let program = read("tools/lab/src/commands/schema.rs");
+        let (_, after) = program.split_once("const SCHEMAS: ").unwrap();
+        let (table, _) = after.split_once("];").unwrap();
+        let names: Vec<&str> = table.split('"').skip(1).step_by(2).collect();
+        assert_eq!(names, SCHEMAS);
     }
 }

@@ -1,17 +1,19 @@
 //! `vigil schema`: what the JSON documents of the commands hold.
 
+use std::ffi::OsStr;
 use std::path::PathBuf;
 
-use schemars::{Schema, SchemaGenerator};
 use vigil_launcher::Summary;
-use vigil_terminal::{CommandError, Outcome, output};
+use vigil_terminal::schema::{self, CommandSchema};
+use vigil_terminal::{CommandError, Outcome};
 use vigil_timeline::TimelineEntry;
 
-use crate::{check, check_publisher, config, faults, list, record, recordings, status};
+use crate::{check, check_publisher, config, faults, laboratory, list, record, recordings, status};
 
 /// Prints the JSON Schema of what a command prints with --json.
 ///
-/// `events` and `faults --follow` print a document a line. The schemas lie in docs/schemas, too.
+/// `events` and `faults --follow` print a document a line. The words of a command's name are joined
+/// by dashes: `pomdp-solve`. The schemas lie in docs/schemas, too.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The command; without one, list those that have a schema.
@@ -22,109 +24,75 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
-/// Makes a schema, from the type that a command prints.
-type Make = fn() -> Schema;
-
-fn schema_of<T: schemars::JsonSchema>() -> Schema {
-    SchemaGenerator::default().into_root_schema_for::<T>()
-}
-
-/// The commands that print JSON, each with its schema.
-const SCHEMAS: [(&str, Make); 10] = [
-    ("run", schema_of::<Summary>),
-    ("list", schema_of::<list::Document>),
-    ("status", schema_of::<status::Document>),
-    ("events", schema_of::<TimelineEntry>),
-    ("faults", schema_of::<faults::Document>),
-    ("check", schema_of::<check::Document<'_>>),
-    (
-        "check-publisher",
-        schema_of::<check_publisher::Document<'_>>,
-    ),
-    ("config", schema_of::<config::Effective<'_>>),
-    ("record", schema_of::<record::Document>),
-    ("recordings", schema_of::<recordings::Document>),
+/// The commands of this program that print JSON, each with its schema.
+const SCHEMAS: [CommandSchema; 10] = [
+    CommandSchema::new::<Summary>("run"),
+    CommandSchema::new::<list::Document>("list"),
+    CommandSchema::new::<status::Document>("status"),
+    CommandSchema::new::<TimelineEntry>("events"),
+    CommandSchema::new::<faults::Document>("faults"),
+    CommandSchema::new::<check::Document<'_>>("check"),
+    CommandSchema::new::<check_publisher::Document<'_>>("check-publisher"),
+    CommandSchema::new::<config::Effective<'_>>("config"),
+    CommandSchema::new::<record::Document>("record"),
+    CommandSchema::new::<recordings::Document>("recordings"),
 ];
 
-/// Prints or writes schemas.
-///
-/// # Errors
-/// A command without one; output that cannot be written.
-pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    if let Some(folder) = &args.out {
-        let failed = |error| CommandError::failure(format!("{}: {error}", folder.display()));
-        std::fs::create_dir_all(folder).map_err(failed)?;
-        for (name, make) in SCHEMAS {
-            let path = folder.join(format!("{name}.json"));
-            std::fs::write(path, text(make)?).map_err(failed)?;
-        }
-        return Ok(Outcome::Done);
-    }
-    let names = SCHEMAS.map(|(name, _)| name);
-    let text = match &args.command {
-        None => names.join("\n"),
-        Some(command) => {
-            let found = SCHEMAS.iter().find(|(name, _)| name == command);
-            let (_, make) = found.ok_or_else(|| {
-                let names = names.join(", ");
-                CommandError::usage(format!("'{command}' has no schema; there are: {names}"))
-            })?;
-            text(*make)?
-        }
-    };
-    output::line(text.trim_end()).map_err(CommandError::failure)?;
-    Ok(Outcome::Done)
+/// Those of this program and of the laboratory.
+fn names() -> Vec<&'static str> {
+    let own = SCHEMAS.iter().map(|schema| schema.name);
+    own.chain(laboratory::SCHEMAS).collect()
 }
 
-fn text(make: Make) -> Result<String, CommandError> {
-    let text = serde_json::to_string_pretty(&make()).map_err(CommandError::failure)?;
-    Ok(text + "\n")
+/// Prints or writes schemas; those of the laboratory it has its program print or write.
+///
+/// # Errors
+/// A command without one; output that cannot be written; a laboratory that is not built.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    if let Some(folder) = &args.out {
+        schema::write(&SCHEMAS, folder)?;
+        let words = ["schema".as_ref(), "--out".as_ref(), folder.as_os_str()];
+        return laboratory::start(&words.map(OsStr::to_owned));
+    }
+    match &args.command {
+        Some(command) if laboratory::SCHEMAS.contains(&command.as_str()) => {
+            return laboratory::start(&["schema", command].map(Into::into));
+        }
+        Some(command) => schema::print(&SCHEMAS, command, &names())?,
+        None => schema::list(&names())?,
+    }
+    Ok(Outcome::Done)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::Value;
     use std::path::Path;
+
+    fn folder() -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/schemas")
+    }
 
     #[test]
     fn the_published_schemas_are_up_to_date() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/schemas");
-        for (name, make) in SCHEMAS {
-            let path = folder.join(format!("{name}.json"));
-            let published = std::fs::read_to_string(path).unwrap_or_default();
-            let hint = "write them anew: target/debug/vigil schema --out docs/schemas";
-            assert!(published == text(make).unwrap(), "{name}: {hint}");
-        }
-        assert_eq!(std::fs::read_dir(folder).unwrap().count(), SCHEMAS.len());
+        let hint = "write them anew: target/debug/vigil schema --out docs/schemas";
+        assert_eq!(schema::outdated(&SCHEMAS, &folder()), [""; 0], "{hint}");
     }
 
-    /// The properties of a schema, at any depth, that say nothing of their meaning.
-    fn unexplained(value: &Value, at: &str, found: &mut Vec<String>) {
-        if let Some(properties) = value["properties"].as_object() {
-            for (name, property) in properties {
-                let is_referred = property.get("$ref").is_some();
-                if property.get("description").is_none() && !is_referred {
-                    found.push(format!("{at}.{name}"));
-                }
-            }
-        }
-        match value {
-            Value::Object(object) => {
-                let children = object.iter();
-                children.for_each(|(key, child)| unexplained(child, &format!("{at}.{key}"), found));
-            }
-            Value::Array(items) => items.iter().for_each(|item| unexplained(item, at, found)),
-            _ => {}
-        }
+    #[test]
+    fn every_published_schema_is_of_a_command_of_this_program_or_of_the_laboratory() {
+        let files = std::fs::read_dir(folder()).unwrap();
+        let files = files.map(|file| file.unwrap().file_name().into_string().unwrap());
+        let mut files: Vec<String> = files.collect();
+        files.sort();
+        let mut wanted: Vec<String> = names().iter().map(|name| format!("{name}.json")).collect();
+        wanted.sort();
+        assert_eq!(files, wanted);
     }
 
     #[test]
     fn every_key_says_what_it_means() {
-        let mut found = Vec::new();
-        for (name, make) in SCHEMAS {
-            unexplained(&serde_json::to_value(make()).unwrap(), name, &mut found);
-        }
-        assert_eq!(found, [""; 0]);
+        let unexplained = SCHEMAS.iter().flat_map(CommandSchema::unexplained_keys);
+        assert_eq!(unexplained.collect::<Vec<_>>(), [""; 0]);
     }
 }
