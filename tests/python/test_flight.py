@@ -14,6 +14,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
+from schemas import problems
 
 WHEELS = ["LF", "LM", "LR", "RF", "RM", "RR"]
 
@@ -52,6 +53,7 @@ def replayed(path):
     """What `vigil replay` says of a recording, and of each of its services."""
     said = vigil("replay", path, "--verify", "--json")
     document = json.loads(said.stdout)
+    assert not (wrong := problems("replay", document)), wrong
     return document, {of["service"]: of for of in document["services"]}
 
 
