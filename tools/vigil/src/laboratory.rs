@@ -9,6 +9,9 @@ use crate::beside;
 
 /// The program's name.
 const PROGRAM: &str = "vigil-lab";
+/// A word that is as like a name as this, by Jaro and Winkler, may be that name. Chosen: swapped,
+/// missing and doubled letters are above it.
+const LIKENESS_MIN: f64 = 0.85;
 /// Its commands, and what each does.
 const COMMANDS: [(&str, &str); 8] = [
     ("init", "Writes the files of a new robot, from its log"),
@@ -60,17 +63,21 @@ pub fn help() -> String {
     text
 }
 
-/// Becomes `vigil-lab` with a command of its own, and these words.
+/// Becomes `vigil-lab` with a command of its own, and these words. Those of `vigil` are `own`.
 ///
 /// # Errors
 /// A command that neither program has; a program that is not built.
-pub fn run(words: &[OsString]) -> Result<Outcome, CommandError> {
+pub fn run(words: &[OsString], own: &clap::Command) -> Result<Outcome, CommandError> {
     let command = words
         .first()
         .and_then(|word| word.to_str())
         .unwrap_or_default();
     if !COMMANDS.iter().any(|(name, _)| *name == command) {
-        let message = format!("'{command}' is no command; `vigil --help` lists them");
+        let own = own.get_subcommands().map(clap::Command::get_name);
+        let names = own.chain(COMMANDS.iter().map(|(name, _)| *name));
+        let meant = similar(command, names)
+            .map_or_else(String::new, |name| format!("; is `vigil {name}` meant?"));
+        let message = format!("'{command}' is no command{meant}; `vigil --help` lists them");
         return Err(CommandError::usage(message));
     }
     start(words)
@@ -88,11 +95,28 @@ pub fn start(words: &[OsString]) -> Result<Outcome, CommandError> {
     match beside::become_program(program, words.iter().cloned())? {}
 }
 
+/// The name that is most like a word, if one is like it.
+fn similar<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let rated = names.map(|name| (strsim::jaro_winkler(word, name), name));
+    let likely = rated.filter(|(likeness, _)| *likeness >= LIKENESS_MIN);
+    let nearest = likely.max_by(|a, b| a.0.total_cmp(&b.0));
+    nearest.map(|(_, name)| name)
+}
+
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
-    use super::{COMMANDS, SCHEMAS};
+    use super::{COMMANDS, SCHEMAS, similar};
+
+    #[test]
+    fn a_command_that_is_misspelt_is_guessed_and_another_word_is_not() {
+        let names = || ["status", "stop", "replay", "report"].into_iter();
+        assert_eq!(similar("statsu", names()), Some("status"));
+        assert_eq!(similar("repaly", names()), Some("replay"));
+        assert_eq!(similar("frobnicate", names()), None);
+        assert_eq!(similar("", names()), None);
+    }
 
     /// A file of the repository.
     fn read(path: &str) -> String {

@@ -113,6 +113,6 @@ fn main() -> ExitCode {
         Command::Schema(args) => schemas::run(&args),
         Command::Completions(args) => shell::completions(&args, Args::command()),
         Command::Man(args) => shell::man(&args, Args::command()),
-        Command::Laboratory(words) => laboratory::run(&words),
+        Command::Laboratory(words) => laboratory::run(&words, &Args::command()),
     })
 }
