@@ -154,7 +154,7 @@ class BlackBox(unittest.TestCase):
         self.assertEqual([service["restarts"] for service in summary["services"].values()], [0, 0, 0, 0])
 
     def test_a_service_that_is_killed_is_a_crash(self):
-        with Graph("--duration", "60", recordings=self.folder) as graph:
+        with Graph("--duration", "60", recordings=self.folder, before_s=30.0) as graph:
             graph.wait_until_up()
             wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
             listed = json.loads(vigil("list", "--json").stdout)["graphs"]
