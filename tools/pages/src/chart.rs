@@ -73,6 +73,43 @@ impl Axis {
         }
     }
 
+    /// Logarithmic around two ends, in powers of ten: a value lies at its logarithm. It is labelled
+    /// at 1, 2 and 5 times each power of ten; if these are more than `count`, at powers alone.
+    pub fn logarithmic(title: &'static str, ends: [f64; 2], count: usize) -> Self {
+        let is_end = |end: f64| end.is_finite() && end > 0.0;
+        let [from, to] = match ends {
+            [from, to] if is_end(from) && is_end(to) => [from, to.max(from)],
+            _ => [1.0, 10.0],
+        };
+        let [first, last] = [from.log10().floor(), to.log10().ceil()].map(|power| power as i32);
+        let powers = first..=last.max(first + 1);
+        // From texts: powers of ten alone are not exact.
+        let text = |power: i32| [1, 2, 5].map(|m| format!("{m}e{power}"));
+        let all = powers.flat_map(text);
+        let all = all.filter_map(|text| Some((text.starts_with('1'), text.parse::<f64>().ok()?)));
+        let all: Vec<(bool, f64)> = all.collect();
+        let begin = all
+            .iter()
+            .rposition(|(_, value)| *value <= from * (1.0 + 1e-9));
+        let end = all
+            .iter()
+            .position(|(_, value)| *value >= to * (1.0 - 1e-9));
+        let begin = begin.unwrap_or(0);
+        let end = end.unwrap_or(all.len() - 1).max(begin + 1);
+        let shown = all.get(begin..=end).unwrap_or_default();
+        let place = |at: usize| shown.get(at).map_or(0.0, |(_, value)| value.log10());
+        let range = [place(0), place(shown.len().saturating_sub(1))];
+        let is_labelled = |(is_power, _): &&(bool, f64)| *is_power || shown.len() <= count;
+        let labelled: Vec<f64> = shown.iter().filter(is_labelled).map(|of| of.1).collect();
+        let apart = labelled.len().div_ceil(count.max(1)).max(1);
+        let ticks = labelled.iter().step_by(apart);
+        Self {
+            title,
+            range,
+            ticks: ticks.map(|v| (v.log10(), v.to_string())).collect(),
+        }
+    }
+
     /// Where a value lies between the ends, 0 to 1; what lies beyond is at an end.
     pub(crate) fn share_of(&self, value: f64) -> f64 {
         let [from, to] = self.range;
@@ -127,12 +164,12 @@ pub(crate) const LETTER: i32 = 22;
 const GRID: &str = "var(--grid)";
 
 /// Where the curves lie in a chart.
-struct Plot<'a> {
+pub(crate) struct Plot<'a> {
     chart: &'a Chart,
-    left: f64,
-    right: f64,
-    top: f64,
-    bottom: f64,
+    pub(crate) left: f64,
+    pub(crate) right: f64,
+    pub(crate) top: f64,
+    pub(crate) bottom: f64,
 }
 
 /// Left and right end of what is drawn between the axes.
@@ -144,7 +181,7 @@ pub(crate) fn sides(width: u32, has_y_title: bool) -> [f64; 2] {
 
 impl<'a> Plot<'a> {
     /// Between the labels and titles of the axes.
-    fn new(chart: &'a Chart) -> Self {
+    pub(crate) fn new(chart: &'a Chart) -> Self {
         let letter = f64::from(LETTER);
         let title = |axis: &Axis| if axis.title.is_empty() { 0.0 } else { letter };
         let (width, height) = chart.size;
@@ -158,15 +195,15 @@ impl<'a> Plot<'a> {
         }
     }
 
-    fn x(&self, value: f64) -> f64 {
+    pub(crate) fn x(&self, value: f64) -> f64 {
         self.left + self.chart.x.share_of(value) * (self.right - self.left)
     }
 
-    fn y(&self, value: f64) -> f64 {
+    pub(crate) fn y(&self, value: f64) -> f64 {
         self.bottom - self.chart.y.share_of(value) * (self.bottom - self.top)
     }
 
-    fn axes(&self, drawing: &mut Drawing) {
+    pub(crate) fn axes(&self, drawing: &mut Drawing) {
         let pen = |width: f64| Pen {
             colour: GRID,
             width,
@@ -196,6 +233,17 @@ impl<'a> Plot<'a> {
         let below = (middle, bottom + 2.0 * letter + 6.0);
         drawing.text(x, below, LETTER, Anchor::Middle);
         drawing.upward_text(y, (letter, centre), LETTER);
+    }
+
+    /// Curves and words.
+    pub(crate) fn content(&self, drawing: &mut Drawing) {
+        for curve in &self.chart.curves {
+            self.curve(curve, drawing);
+        }
+        for label in &self.chart.labels {
+            let at = (self.x(label.at.0) + 12.0, self.y(label.at.1) - 4.0);
+            drawing.text(&label.text, at, LETTER, Anchor::Start);
+        }
     }
 
     fn curve(&self, curve: &Curve, drawing: &mut Drawing) {
@@ -250,13 +298,7 @@ impl Chart {
         let mut drawing = Drawing::new("currentColor");
         let plot = Plot::new(self);
         plot.axes(&mut drawing);
-        for curve in &self.curves {
-            plot.curve(curve, &mut drawing);
-        }
-        for label in &self.labels {
-            let at = (plot.x(label.at.0) + 12.0, plot.y(label.at.1) - 4.0);
-            drawing.text(&label.text, at, LETTER, Anchor::Start);
-        }
+        plot.content(&mut drawing);
         drawing.element(self.size.0, self.size.1, &self.caption)
     }
 }
@@ -284,6 +326,21 @@ mod tests {
             ["0.0", "0.5", "1.0"]
         );
         assert_eq!(Axis::linear("", f64::NAN, 2.0).range, [0.0, 1.0]);
+    }
+
+    #[test]
+    fn a_logarithmic_axis_is_labelled_around_its_ends() {
+        let labels = |ends: [f64; 2], count: usize| {
+            let axis = Axis::logarithmic("", ends, count);
+            ticks(&axis).join(" ")
+        };
+        assert_eq!(labels([0.3, 4.0], 9), "0.2 0.5 1 2 5");
+        assert_eq!(labels([1.0, 1.0], 9), "1 2");
+        assert_eq!(labels([0.000_3, 40.0], 9), "0.001 0.01 0.1 1 10");
+        assert_eq!(labels([1e-9, 1e9], 10).split(' ').count(), 10);
+        assert_eq!(labels([0.0, f64::NAN], 9), "1 2 5 10");
+        let range = Axis::logarithmic("", [0.1, 1000.0], 9).range;
+        assert_eq!(range, [-1.0, 3.0]);
     }
 
     #[test]

@@ -34,6 +34,20 @@ const FAULTS: [Tone; 8] = [
 ];
 /// Colours of things that are no faults.
 pub const SERIES: usize = 6;
+/// Shades of a share, from weak to strong: of one hue, so that only their darkness tells.
+const LIGHT_SHADES: [&str; SHADES] = [
+    "#77cced", "#58b7e3", "#3ea3d8", "#2e92d0", "#1776ba", "#0d5da5", "#0e4790", "#103179",
+    "#101e61",
+];
+/// The same in dark pages: the stronger, the brighter.
+const DARK_SHADES: [&str; SHADES] = [
+    "#293e84", "#2a4f97", "#2a5fa6", "#2b6fb1", "#3f8bc7", "#58a6d8", "#79c2e9", "#9fddf8",
+    "#d1f2fe",
+];
+/// How many shades there are.
+pub const SHADES: usize = 9;
+/// From this shade on a text is read in the colour of the page's back, below it in that of texts.
+const STRONG: usize = 4;
 
 /// What something is drawn in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +66,8 @@ pub enum Colour {
     Fault(usize),
     /// Of things that are no faults, from 0.
     Series(usize),
+    /// Of a share, from 0: the more, the further from the page's back.
+    Shade(usize),
 }
 
 impl Colour {
@@ -76,6 +92,7 @@ impl Colour {
             Self::Unknown => "var(--soft)".to_owned(),
             Self::Fault(place) => format!("var(--f{})", hue(place) + 1),
             Self::Series(index) => format!("var(--c{})", index % SERIES + 1),
+            Self::Shade(index) => format!("var(--h{})", index.min(SHADES - 1) + 1),
         }
     }
 
@@ -94,6 +111,16 @@ impl Colour {
     }
 }
 
+/// The colour of a text that lies on a shade.
+#[must_use]
+pub const fn on_shade(index: usize) -> &'static str {
+    if index < STRONG {
+        "var(--ink)"
+    } else {
+        "var(--back)"
+    }
+}
+
 const fn hue(place: usize) -> usize {
     place.saturating_sub(1) % FAULTS.len()
 }
@@ -107,14 +134,17 @@ pub const fn middle(place: usize) -> &'static str {
     }
 }
 
-/// The variables of a page, `--f0` for healthy.
+/// The variables of a page: `--f0` for healthy, `--h1` for the weakest shade.
 pub(crate) fn variables(is_dark: bool) -> String {
     let all = [&HEALTHY].into_iter().chain(&FAULTS).enumerate();
     let one = |(at, tone): (usize, &Tone)| {
         let colour = if is_dark { tone.dark } else { tone.light };
         format!("--f{at}:{colour};")
     };
-    all.map(one).collect()
+    let shades = if is_dark { DARK_SHADES } else { LIGHT_SHADES };
+    let shades = shades.iter().enumerate();
+    let shades = shades.map(|(at, colour)| format!("--h{}:{colour};", at + 1));
+    all.map(one).chain(shades).collect()
 }
 
 #[cfg(test)]
@@ -147,6 +177,30 @@ mod tests {
             assert!(contrast(tone.dark, "#1a1a19") > 3.0, "{}", tone.dark);
             for back in ["#ffffff", "#000000"] {
                 assert!(contrast(tone.middle, back) > 2.7, "{}", tone.middle);
+            }
+        }
+    }
+
+    #[test]
+    fn shades_leave_the_back_step_by_step_and_texts_on_them_are_readable() {
+        let pages = [
+            (LIGHT_SHADES, "#fcfcfb", "#1c1c1a"),
+            (DARK_SHADES, "#1a1a19", "#f0f0ea"),
+        ];
+        for (shades, back, ink) in pages {
+            assert!(contrast(shades[0], back) > 1.7, "the weakest is seen");
+            for pair in shades.windows(2) {
+                assert!(contrast(pair[1], back) > 1.2 * contrast(pair[0], back));
+            }
+            for (index, shade) in shades.into_iter().enumerate() {
+                let text = if on_shade(index) == "var(--ink)" {
+                    ink
+                } else {
+                    back
+                };
+                assert!(contrast(shade, text) > 4.5, "{shade}");
+                let [red, green, blue] = parts(shade);
+                assert!(blue > green && green > red, "blue, never red or green");
             }
         }
     }

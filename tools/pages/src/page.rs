@@ -7,11 +7,9 @@ use crate::stroke::Stroke;
 /// Style of the page; colours for light and dark, to which those of faults come.
 const STYLE: &str = "\
 :root{color-scheme:light dark;--back:#fcfcfb;--ink:#1c1c1a;--soft:#63635e;--grid:#d6d6d0;\
---c1:#2a78d6;--c2:#d9541e;--c3:#16936a;--c4:#7a5fd0;--c5:#b87f00;--c6:#d43f3f;\
---good:27 150 110;--bad:212 63 63}
+--c1:#2a78d6;--c2:#d9541e;--c3:#16936a;--c4:#7a5fd0;--c5:#b87f00;--c6:#d43f3f}
 @media (prefers-color-scheme:dark){:root{--back:#1a1a19;--ink:#f0f0ea;--soft:#a9a9a2;\
---grid:#46463f;--c1:#4c97ee;--c2:#ee7a48;--c3:#2bb587;--c4:#a296f0;--c5:#d59a1c;--c6:#ee7474;\
---good:43 181 135;--bad:238 116 116}}
+--grid:#46463f;--c1:#4c97ee;--c2:#ee7a48;--c3:#2bb587;--c4:#a296f0;--c5:#d59a1c;--c6:#ee7474}}
 body{background:var(--back);color:var(--ink);font:15px/1.45 system-ui,sans-serif;\
 margin:0 auto;max-width:1240px;padding:1.2rem}
 h1{font-size:1.5rem;margin:0 0 .3rem}h2{font-size:1.15rem;margin:2.2rem 0 .4rem}
@@ -19,7 +17,8 @@ h3{font-size:1rem;margin:.6rem 0 .2rem}p{max-width:75ch;margin:.3rem 0 .7rem}
 .soft,caption{color:var(--soft);font-size:.87rem}
 .pair{display:grid;grid-template-columns:repeat(2,minmax(0,1fr));gap:1.4rem}
 @media (max-width:800px){.pair{grid-template-columns:minmax(0,1fr)}}
-.wide{overflow-x:auto}svg{width:100%;height:auto;display:block;color:var(--ink)}
+.wide{overflow-x:auto}.wide td:first-child{white-space:nowrap}
+svg{width:100%;height:auto;display:block;color:var(--ink)}
 table{border-collapse:collapse;font-size:.87rem;font-variant-numeric:tabular-nums}
 caption{text-align:left;padding:.2rem 0}
 th,td{padding:.2rem .6rem;text-align:left;border-bottom:1px solid var(--grid);vertical-align:top}
@@ -28,7 +27,7 @@ th{font-weight:600}td.n,th.n{text-align:right}tr.group th{padding-top:1rem}
 .matrix thead th{writing-mode:vertical-rl;transform:rotate(180deg);text-align:left}
 .matrix thead th.corner{writing-mode:horizontal-tb;transform:none;vertical-align:bottom}
 .matrix tbody th{text-align:right;font-weight:400}.matrix thead th{font-weight:400}
-.right{background:rgb(var(--good)/var(--a))}.wrong{background:rgb(var(--bad)/var(--a))}
+.right{outline:3px solid var(--f0);outline-offset:-3px}
 .key{font-size:.85rem;margin:0 0 .3rem}.key span{white-space:nowrap;margin-right:1rem}
 .key i{display:inline-block;width:1.3em;height:0;border-top:3px solid;vertical-align:middle;\
 margin-right:.35em}.key i.dashed{border-top-style:dashed}.key i.dotted{border-top-style:dotted}

@@ -91,6 +91,18 @@ impl Drawing {
         self.area(&[a, (b.0, a.1), b, (a.0, b.1)], colour, opacity);
     }
 
+    /// Filled rectangles, each between two corners across from each other. An edge of the same
+    /// colour closes the seams between neighbours, and keeps the narrowest visible.
+    pub fn rectangles(&mut self, corners: &[[Point; 2]], colour: &str) {
+        let one = |[a, b]: &[Point; 2]| {
+            format!("M{:.1} {:.1}H{:.1}V{:.1}H{:.1}Z", a.0, a.1, b.0, b.1, a.0)
+        };
+        let path: String = corners.iter().map(one).collect();
+        self.push(format_args!(
+            "<path d=\"{path}\" fill=\"{colour}\" stroke=\"{colour}\" stroke-width=\"0.7\"/>"
+        ));
+    }
+
     /// A filled circle.
     pub fn dot(&mut self, (x, y): Point, radius: f64, colour: &str) {
         self.push(format_args!(

@@ -1,18 +1,18 @@
 //! A curve of any length in a bounded number of points, from which no spike is lost.
 
+use crate::columns::{Column, Columns};
+
 /// Columns of a trace at most, as many as a chart has pixels beside each other.
-const COLUMNS: usize = 1024;
+const COLUMNS: u32 = 1024;
 /// Seconds that a column has at first.
 const WIDTH_S: f64 = 1e-3;
 
 /// A time, s, and the value then.
 type Sample = (f64, f64);
 
-/// What lies in one column.
+/// What a trace keeps of a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Column {
-    /// Number of the column, from the beginning.
-    at: u64,
+struct Extremes {
     first: Sample,
     min: Sample,
     max: Sample,
@@ -21,25 +21,26 @@ struct Column {
     is_after_break: bool,
 }
 
-impl Column {
-    const fn new(at: u64, point: Sample, is_after_break: bool) -> Self {
-        Self {
-            at,
-            first: point,
-            min: point,
-            max: point,
-            last: point,
-            is_after_break,
-        }
-    }
-
-    fn take(&mut self, next: &Self) {
+impl Column for Extremes {
+    fn join(&mut self, next: Self) {
         self.last = next.last;
         if next.min.1 < self.min.1 {
             self.min = next.min;
         }
         if next.max.1 > self.max.1 {
             self.max = next.max;
+        }
+    }
+}
+
+impl Extremes {
+    const fn new(point: Sample, is_after_break: bool) -> Self {
+        Self {
+            first: point,
+            min: point,
+            max: point,
+            last: point,
+            is_after_break,
         }
     }
 
@@ -56,8 +57,7 @@ impl Column {
 /// column of time, and the first and the last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trace {
-    columns: Vec<Column>,
-    width_s: f64,
+    columns: Columns<Extremes>,
     is_broken: bool,
     /// The least and the greatest value so far.
     bounds: Option<[f64; 2]>,
@@ -67,8 +67,7 @@ pub struct Trace {
 impl Default for Trace {
     fn default() -> Self {
         Self {
-            columns: Vec::new(),
-            width_s: WIDTH_S,
+            columns: Columns::new(COLUMNS, WIDTH_S),
             is_broken: false,
             bounds: None,
             last: None,
@@ -83,28 +82,17 @@ impl Trace {
         if !(t_s.is_finite() && t_s >= 0.0 && value.is_finite()) {
             return self.interrupt();
         }
-        while t_s / self.width_s >= COLUMNS as f64 {
-            self.widen();
-        }
         let [least, greatest] = self.bounds.unwrap_or([value; 2]);
         self.bounds = Some([least.min(value), greatest.max(value)]);
         self.last = Some((t_s, value));
-        let at = (t_s / self.width_s) as u64;
-        let column = Column::new(at, (t_s, value), self.is_broken);
-        match self.columns.last_mut() {
-            // A clock that goes back stays in its column.
-            Some(last) if last.at >= at && !self.is_broken => last.take(&column),
-            _ => self.columns.push(column),
-        }
+        let extremes = Extremes::new((t_s, value), self.is_broken);
+        self.columns.add(t_s, extremes, self.is_broken);
         self.is_broken = false;
-        if self.columns.len() > 2 * COLUMNS {
-            self.widen();
-        }
     }
 
     /// The curve is not drawn from here to the next value.
     pub const fn interrupt(&mut self) {
-        self.is_broken = !self.columns.is_empty();
+        self.is_broken = self.last.is_some();
     }
 
     /// The least and the greatest value.
@@ -125,24 +113,11 @@ impl Trace {
         self.bounds.map_or(0.0, |[_, max]| max)
     }
 
-    fn widen(&mut self) {
-        self.width_s *= 2.0;
-        let mut merged: Vec<Column> = Vec::with_capacity(COLUMNS);
-        for mut column in self.columns.drain(..) {
-            column.at /= 2;
-            match merged.last_mut() {
-                Some(last) if last.at >= column.at => last.take(&column),
-                _ => merged.push(column),
-            }
-        }
-        self.columns = merged;
-    }
-
     /// The pieces of the curve between interruptions, without points between others of one level.
     #[must_use]
     pub fn pieces(&self) -> Vec<Vec<(f64, f64)>> {
         let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();
-        for column in &self.columns {
+        for (_, column) in self.columns.iter() {
             if column.is_after_break || pieces.is_empty() {
                 pieces.push(Vec::new());
             }
@@ -184,7 +159,7 @@ mod tests {
         };
         let trace = trace(1_000_000, value);
         let points = trace.pieces().concat();
-        assert!(points.len() <= 4 * COLUMNS, "{}", points.len());
+        assert!(points.len() <= 4 * COLUMNS as usize, "{}", points.len());
         assert!(points.contains(&(1234.56, 9.0)), "the upper one");
         assert!(points.contains(&(7777.77, -9.0)), "the lower one");
         assert_eq!(trace.bounds(), Some([-9.0, 9.0]));
@@ -214,6 +189,6 @@ mod tests {
             far.interrupt();
             far.add(2e12, f64::from(i));
         }
-        assert!(far.pieces().len() <= 2 * COLUMNS + 1);
+        assert!(far.pieces().len() <= 2 * COLUMNS as usize + 1);
     }
 }
