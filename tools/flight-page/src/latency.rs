@@ -4,15 +4,27 @@ use hdrhistogram::Histogram;
 use vigil_blocks::{Action, CauseKind};
 use vigil_pages::chart::{Axis, Chart, Curve, Label, Stroke};
 use vigil_pages::colour::Colour;
-use vigil_pages::page::{remark, table, titled};
+use vigil_pages::columns::Columns;
+use vigil_pages::heat::{Grid, HeatMap, Scale};
+use vigil_pages::page::{KeyEntry, key, remark, table, titled};
+use vigil_pages::spectrum::{Spectrum, ends};
 
-use crate::belief::{TimedTrace, WIDTH};
+use crate::belief::WIDTH;
 
 /// Longest latency that is told apart, ns.
 const LATENCY_NS_MAX: u64 = 100_000_000_000;
 /// Steps of the histogram for a factor of ten.
 const STEPS: f64 = 20.0;
 const SIZE: (u32, u32) = (WIDTH, 380);
+const HEAT_SIZE: (u32, u32) = (WIDTH, 460);
+/// Labels of a logarithmic axis at most: to the right, and upwards.
+const LABELS_MAX: [usize; 2] = [20, 9];
+/// Columns of the heat map at most, and their width at first, s.
+const COLUMNS: u32 = 512;
+const COLUMN_S: f64 = 0.01;
+/// With fewer actions in each, columns are made wider, as long as so many are left.
+const ACTIONS_LEAST: u64 = 25;
+const COLUMNS_LEAST: u64 = 64;
 const MS: f64 = 1e-6;
 
 /// How late actions came.
@@ -20,7 +32,8 @@ const MS: f64 = 1e-6;
 pub(crate) struct Latencies {
     /// `None` only if the bounds were none of a histogram.
     counts: Option<Histogram<u64>>,
-    trace: TimedTrace,
+    /// The same over time, ms.
+    over_time: Columns<Spectrum>,
     /// Actions that answer no frame, because it was missed.
     missed: u64,
 }
@@ -29,30 +42,14 @@ impl Default for Latencies {
     fn default() -> Self {
         Self {
             counts: Histogram::new_with_bounds(1, LATENCY_NS_MAX, 3).ok(),
-            trace: TimedTrace::default(),
+            over_time: Columns::new(COLUMNS, COLUMN_S),
             missed: 0,
         }
     }
 }
 
-/// Values at which a logarithmic axis between two ends is labelled, ms.
-fn labelled_ms(from_ms: f64, to_ms: f64) -> Vec<f64> {
-    let powers = (-6..=6).map(|power| 10.0_f64.powi(power));
-    let all = powers.flat_map(|power| [1.0, 2.0, 5.0].map(|m| round(m * power)));
-    let all: Vec<f64> = all.collect();
-    let first = all.iter().rposition(|ms| *ms <= from_ms).unwrap_or(0);
-    let last = all.iter().position(|ms| *ms >= to_ms);
-    let last = last.unwrap_or(all.len() - 1).max(first + 1);
-    all.get(first..=last).unwrap_or_default().to_vec()
-}
-
-/// Without the dust of powers of ten.
-fn round(ms: f64) -> f64 {
-    (ms * 1e6).round() / 1e6
-}
-
-/// A broken line at a bound.
-pub(crate) fn bound(points: [(f64, f64); 2]) -> Curve {
+/// A broken line at the deadline.
+fn bound(points: [(f64, f64); 2]) -> Curve {
     Curve {
         colour: Colour::Alarm,
         stroke: Stroke::Dashed,
@@ -63,12 +60,8 @@ pub(crate) fn bound(points: [(f64, f64); 2]) -> Curve {
 fn histogram(counts: &Histogram<u64>, deadline_ms: f64) -> String {
     let [least, most] = [counts.min(), counts.max()].map(|ns| ns as f64 * MS);
     let ends = [least, most.max(deadline_ms)];
-    let values = labelled_ms(ends[0], ends[1]);
-    let x = Axis::placed(
-        "from the due instant to the action, ms",
-        &values,
-        f64::log10,
-    );
+    let title = "from the due instant to the action, ms";
+    let x = Axis::logarithmic(title, ends, LABELS_MAX[0]);
     let [from, to] = x.range;
     let bins = ((to - from) * STEPS).ceil().max(1.0) as usize;
     let edge = |bin: usize| from + (to - from) * bin as f64 / bins as f64;
@@ -129,7 +122,9 @@ impl Latencies {
             if let Some(counts) = &mut self.counts {
                 counts.saturating_record(late_ns.max(1));
             }
-            self.trace.add(t_s, late_ns as f64 * MS);
+            let late_ms = late_ns.max(1) as f64 * MS;
+            let spectrum = [late_ms].into_iter().collect();
+            self.over_time.add(t_s, spectrum, false);
         }
     }
 
@@ -170,29 +165,52 @@ impl Latencies {
         format!("{}{histogram}{over_time}", table(&heads, &[row]))
     }
 
+    /// Columns with enough actions in each to speak of shares.
+    fn columns(&self) -> Columns<Spectrum> {
+        let mut columns = self.over_time.clone();
+        let actions: u64 = columns.iter().map(|(_, of)| of.total()).sum();
+        while columns.span() >= 2 * COLUMNS_LEAST && actions < ACTIONS_LEAST * columns.span() {
+            columns.widen();
+        }
+        columns
+    }
+
     fn over_time(&self, time: &Axis, deadline_ms: f64) -> String {
-        let highest = 1.05 * self.trace.max().max(deadline_ms);
-        let mut curves = self.trace.curves(Colour::Series(0), Stroke::Thin);
-        let mut labels = Vec::new();
+        let columns = self.columns();
+        let (count, width_s) = (columns.span() as usize, columns.width_s());
+        let nothing = Spectrum::default();
+        let mut spectra = vec![&nothing; count];
+        for (at, spectrum) in columns.iter() {
+            spectra[at as usize] = spectrum;
+        }
+        let edges = (0..=count).map(|edge| edge as f64 * width_s).collect();
+        let grid = Grid::new(edges, &spectra).turned();
+        let [least, most] = ends(spectra).unwrap_or([1.0; 2]);
+        let y = Axis::logarithmic("latency, ms", [least, most.max(deadline_ms)], LABELS_MAX[1]);
+        let (mut curves, mut names) = (Vec::new(), String::new());
         if deadline_ms > 0.0 {
-            let [from_s, to_s] = time.range;
-            curves.push(bound([(from_s, deadline_ms), (to_s, deadline_ms)]));
-            let at = (from_s, 0.93 * deadline_ms);
-            labels.push(Label {
-                at,
-                text: "deadline".to_owned(),
-            });
+            let place = deadline_ms.log10();
+            curves.push(bound(time.range.map(|t_s| (t_s, place))));
+            names = key(&[KeyEntry {
+                colour: Colour::Alarm,
+                stroke: Stroke::Dashed,
+                name: format!("deadline, {deadline_ms} ms"),
+            }]);
         }
         let caption = "End-to-end latency over time";
-        let chart = Chart {
-            caption: caption.to_owned(),
-            size: SIZE,
-            x: time.clone(),
-            y: Axis::linear("latency, ms", highest, 4.0),
-            curves,
-            labels,
+        let map = HeatMap {
+            chart: Chart {
+                caption: format!("{caption}: share of the actions at each time"),
+                size: HEAT_SIZE,
+                x: time.clone(),
+                y,
+                curves,
+                labels: Vec::new(),
+            },
+            scale: Scale::logarithmic("share of the actions at that time", &grid.all()),
+            grid,
         };
-        titled(caption, "", &chart.svg())
+        titled(caption, &names, &map.svg())
     }
 }
 
@@ -200,13 +218,6 @@ impl Latencies {
 mod tests {
     use super::*;
     use vigil_blocks::{Cause, Header};
-
-    #[test]
-    fn a_logarithmic_axis_is_labelled_around_its_ends() {
-        assert_eq!(labelled_ms(0.3, 4.0), [0.2, 0.5, 1.0, 2.0, 5.0]);
-        assert_eq!(labelled_ms(1.0, 1.0), [1.0, 2.0]);
-        assert!(labelled_ms(0.0, 1e9).len() > 30);
-    }
 
     #[test]
     fn late_actions_are_counted_and_nothing_is_drawn_of_none() {
@@ -233,6 +244,31 @@ mod tests {
             charts.contains("<td>5.000</td><td>1</td><td>999</td><td>1</td>"),
             "{charts}"
         );
-        assert!(!charts.contains("NaN") && charts.contains("deadline"));
+        assert!(!charts.contains("NaN") && charts.contains("deadline, 5 ms"));
+        let weakest = charts.matches("fill=\"var(--h1)\"").count();
+        assert_eq!(
+            weakest, 2,
+            "one late action is a cell, beside that of the key"
+        );
+    }
+
+    #[test]
+    fn columns_are_bounded_however_long_a_recording_is_and_few_actions_have_wide_ones() {
+        let columns = |count: u64, step_s: f64| {
+            let mut latencies = Latencies::default();
+            let mut action = Action::default();
+            action.header.t_publish_ns = 1_000_000;
+            action.cause.kind = 1;
+            (0..count).for_each(|i| latencies.take(i as f64 * step_s, &action));
+            let charts = latencies.charts(&Axis::linear("time, s", 9.0, 5.0), 0);
+            assert!(!charts.contains("NaN") && !charts.contains("stroke-dasharray"));
+            (latencies.over_time.span(), latencies.columns().span())
+        };
+        let (kept, drawn) = columns(100_000, 0.5);
+        assert!((256..=512).contains(&kept) && drawn == kept);
+        let (_, drawn) = columns(300, 0.05);
+        assert!((64..128).contains(&drawn), "{drawn}");
+        assert!((64..128).contains(&columns(2, 1e9).1));
+        assert_eq!(columns(1, 0.0), (1, 1));
     }
 }

@@ -360,8 +360,9 @@ const EVENTS: &str = "What the services told, in the order of time.";
 const PATH: &str = "The measured pose in the plane; both axes have the same scale. Arrows show the \
                     direction, dots the start, the end and each alarm.";
 const LATENCY: &str = "From the instant at which a cycle was due to the publication of its action; \
-                       then what each service needs for a cycle, as its health says 20 times a \
-                       second.";
+                       over time, each column shows the actions of that time, and one late action \
+                       alone is seen. Then what each service needs for a cycle, as its health says \
+                       20 times a second.";
 const HEALTH: &str = "Counted within the recording; the longest cycle is that since the service's \
                       start.";
 const GAPS: &str = "Of each topic, by the sequence numbers of its writer. Of particles only some \

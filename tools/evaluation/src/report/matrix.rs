@@ -4,7 +4,13 @@ use std::collections::BTreeSet;
 
 use super::{Report, words};
 use crate::scoring::{MULTIPLE, Matrix, Taxonomy, UNKNOWN};
+use vigil_pages::heat::Scale;
 use vigil_pages::page::{Section, beside, escaped};
+
+/// Shades of the cells.
+const SHARES: Scale = Scale::linear("share of the runs in a row");
+/// Width of the key of the shades.
+const KEY_WIDTH: u32 = 1800;
 
 /// Words that occur in a matrix, leaves first, in the tree's order.
 fn order(words: &BTreeSet<&str>, taxonomy: &Taxonomy) -> Vec<String> {
@@ -47,9 +53,9 @@ fn table(matrix: &Matrix, taxonomy: &Taxonomy, caption: &str) -> String {
                 return "<td></td>".to_owned();
             }
             let right = word == truth || (*word == UNKNOWN && !is_known(truth));
-            let class = if right { "right" } else { "wrong" };
-            let a = 0.15 + 0.55 * n as f64 / total.max(1) as f64;
-            format!("<td class=\"{class}\" style=\"--a:{a:.2}\">{n}</td>")
+            let class = if right { " class=\"right\"" } else { "" };
+            let style = SHARES.style(n as f64 / total.max(1) as f64);
+            format!("<td{class} style=\"{style}\">{n}</td>")
         };
         let cells: String = columns.iter().map(cell).collect();
         format!("<tr><th>{}</th>{cells}</tr>\n", escaped(truth))
@@ -80,11 +86,11 @@ pub fn section(report: &Report<'_>) -> Section {
     };
     let parts: Vec<String> = report.sets.iter().map(part).collect();
     let about = "Runs; rows: what was true, columns: what was reported 2 s after the onset (in \
-                 nominal runs: at the end).";
+                 nominal runs: at the end). What is right has a green frame.";
     Section {
         id: "confusion",
         heading: "Confusion",
         about: about.to_owned(),
-        inside: beside(&parts),
+        inside: format!("{}\n{}", SHARES.key(KEY_WIDTH), beside(&parts)),
     }
 }

@@ -117,10 +117,11 @@ fn the_page_is_well_formed_and_loads_nothing() {
     ] {
         assert!(!html.contains(outside), "{outside}");
     }
-    // Two each of calibration, delay, delay and misses over alarms, and two a run.
+    // The key of shades, two each of calibration, delay, delay and misses over alarms, and two a
+    // run.
     let drawings = page.descendants().filter(|node| node.has_tag_name("svg"));
     let drawings: Vec<_> = drawings.collect();
-    assert_eq!(drawings.len(), 8 + 2 * 4);
+    assert_eq!(drawings.len(), 1 + 8 + 2 * 4);
     // No drawing keeps a colour that the page cannot change with light and dark.
     for drawing in drawings {
         for node in drawing.descendants() {
