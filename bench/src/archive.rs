@@ -21,6 +21,8 @@ const RAW: &str = "target/bench";
 pub struct Archive {
     run: Run,
     host: String,
+    /// Names of raw files that are pages to read.
+    pages: Vec<String>,
 }
 
 impl Archive {
@@ -56,7 +58,11 @@ impl Archive {
             raw: Vec::new(),
         };
         let host = output(&mut Command::new("hostname"));
-        Ok(Self { run, host })
+        Ok(Self {
+            run,
+            host,
+            pages: Vec::new(),
+        })
     }
 
     /// Where its raw data lie.
@@ -80,6 +86,37 @@ impl Archive {
     /// The file system's.
     pub fn store_text(&self, name: &str, text: &str) -> io::Result<()> {
         fs::write(self.folder().join(name), text)
+    }
+
+    /// Stores a page beside the raw data; where it lies is said at the end.
+    ///
+    /// # Errors
+    /// The file system's.
+    pub fn store_page(&mut self, name: &str, html: &str) -> io::Result<()> {
+        self.pages.push(name.to_owned());
+        self.store_text(name, html)
+    }
+
+    /// What was measured, on what: name and value, for a page.
+    #[must_use]
+    pub fn facts(&self) -> Vec<Vec<String>> {
+        let (run, machine) = (&self.run, &self.run.machine);
+        let of = |name: &str| match &machine[name] {
+            Value::String(text) => text.clone(),
+            other => other.to_string(),
+        };
+        let commit = machine::commit_in_words(run.commit.as_deref(), machine);
+        let all = [
+            ("command", run.command.clone()),
+            ("day", run.date.clone()),
+            ("measured", commit),
+            ("processor", of("processor")),
+            ("cores", of("cores")),
+            ("kernel", of("kernel")),
+            ("virtual machine", of("hypervisor")),
+        ];
+        let row = |(name, value): (&str, String)| vec![name.to_owned(), value];
+        all.into_iter().map(row).collect()
     }
 
     /// Adds lines to the summary, and shows them.
@@ -118,7 +155,11 @@ impl Archive {
         let summary = self.run.summary.join("\n");
         self.store_text("summary.md", &format!("{summary}\n"))?;
         self.run.raw = Raw::list(&self.folder())?;
-        let Self { mut run, host } = self;
+        let Self {
+            mut run,
+            host,
+            pages,
+        } = self;
         run.shrink();
         let folder = format!("{RESULTS}/{}-{host}", run.date);
         fs::create_dir_all(root().join(&folder))?;
@@ -126,6 +167,9 @@ impl Archive {
         fs::write(root().join(&path), run.text())?;
         println!("\nresult: {path}; `scripts/bench page` brings it into bench/README.md");
         println!("raw data: {RAW}/{}/", run.question);
+        for page in pages {
+            println!("page: {RAW}/{}/{page}", run.question);
+        }
         Ok(())
     }
 }

@@ -13,4 +13,5 @@ pub mod files;
 pub mod flood;
 pub mod graph;
 pub mod load;
+pub mod page;
 pub mod system;

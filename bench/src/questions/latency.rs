@@ -11,6 +11,7 @@ use serde_json::Value;
 use vigil_bench::archive::Archive;
 use vigil_bench::latency::cell::{Cell, Scheduling, Spec};
 use vigil_bench::latency::load::Load;
+use vigil_bench::latency::page::{ABOUT, CellFigures, HEADS, LatencyPage};
 use vigil_bench::latency::{files, system};
 use vigil_bench::percentile;
 use vigil_cycle::latency::Percentiles;
@@ -140,37 +141,42 @@ fn print_one(specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
 
 fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new(&archive_name(args, specs))?;
-    archive.say(
-        "Times in us; every latency from the schedule, hand-over and floor without compute; \
-         folded are instants that only a later one's answer ended. Own, by stage: instants that \
-         each stage answered after its own deadline and that are not the machine's. Every cycle \
-         lies with the raw data.\n",
-    );
-    archive.say(
-        "| cell | cycles | folded | end to end p50 | p99 | p99.9 | max | hand-over p50 | p99 | \
-         floor p50 | p99 | missed: own | machine | no one stall | machine / canary | own, by \
-         stage |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
-    );
+    archive.say(&format!("{ABOUT}\n"));
+    archive.say(&format!(
+        "| {} |\n|{}",
+        HEADS.join(" | "),
+        "---|".repeat(HEADS.len())
+    ));
+    let mut page = LatencyPage {
+        facts: archive.facts(),
+        ..LatencyPage::default()
+    };
     let mut cells = Vec::new();
     for (i, spec) in specs.iter().enumerate() {
         eprintln!("{} of {}: {}", i + 1, specs.len(), spec.name());
-        match spec.run(folder) {
+        let row = match spec.run(folder) {
             Ok(cell) => {
-                archive.say(&line(&cell));
                 let name = format!("{:02}-{}", i + 1, spec.name());
                 files::write(&cell, &archive.folder().join(name))?;
                 cells.push(cell.json());
+                let run = (args.repeat > 1).then_some(i % args.repeat + 1);
+                page.cells.push(CellFigures::new(&cell, run));
+                row(&cell)
             }
             Err(error) => {
-                let (name, why) = (spec.name(), error.to_string().trim().replace('\n', "; "));
-                let empty = "| ".repeat(14);
-                archive.say(&format!("| {name} | not measured: {why} {empty}|"));
+                let why = error.to_string().trim().replace('\n', "; ");
+                let mut row = vec![spec.name(), format!("not measured: {why}")];
+                row.resize(HEADS.len(), String::new());
+                row
             }
-        }
+        };
+        archive.say(&format!("| {} |", row.join(" | ")));
+        page.rows.push(row);
     }
     archive.store("machine.json", &system::facts())?;
     let unmeasured = specs.len() - cells.len();
     archive.store("cells.json", &Value::from(cells))?;
+    archive.store_page("latency.html", &page.html())?;
     archive.close()?;
     if unmeasured > 0 {
         return Err(format!("{unmeasured} cells were not measured").into());
@@ -178,7 +184,8 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
     Ok(())
 }
 
-fn line(cell: &Cell) -> String {
+/// The row of a cell below [`HEADS`].
+fn row(cell: &Cell) -> Vec<String> {
     let us = |ns: u64| format!("{:.1}", ns as f64 * 1e-3);
     let whole = cell.graph.end_to_end.percentiles();
     let hand_over = cell.graph.hand_over.percentiles();
@@ -188,12 +195,11 @@ fn line(cell: &Cell) -> String {
         percentile(q, of.n, us(ns))
     };
     let (ours, machine) = cell.missed();
-    format!(
-        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {ours} | {machine} | {} | {} | \
-         {} |",
+    let over_canary = cell.machine_over_canary();
+    let row: [String; HEADS.len()] = [
         cell.spec.name(),
-        cell.cycles.len(),
-        cell.folded(),
+        cell.cycles.len().to_string(),
+        cell.folded().to_string(),
         us(whole.p50_ns),
         tail(0.99, &whole),
         tail(0.999, &whole),
@@ -202,9 +208,11 @@ fn line(cell: &Cell) -> String {
         tail(0.99, &hand_over),
         us(floor.p50_ns),
         tail(0.99, &floor),
-        cell.not_one_stall(),
-        cell.machine_over_canary()
-            .map_or_else(|| "-".into(), |times| format!("{times:.2}")),
+        ours.to_string(),
+        machine.to_string(),
+        cell.not_one_stall().to_string(),
+        over_canary.map_or_else(|| "-".into(), |times| format!("{times:.2}")),
         cell.own_by_stage(),
-    )
+    ];
+    row.to_vec()
 }
