@@ -52,8 +52,8 @@ pub enum JournalKind {
     Refused = 6,
     /// A detection was seen for its blindness alone.
     Looked = 7,
-    /// The faults go on from those that an earlier supervisor has left: `input` names the block that
-    /// says them.
+    /// The faults go on from those that an earlier supervisor has left; `input` names the block
+    /// that says them.
     Restored = 8,
     /// A frame was kept, for what is measured when a fault begins.
     Kept = 9,
