@@ -167,9 +167,10 @@ class BlackBox(unittest.TestCase):
         self.assertIn("detector", flight.about["vigil"]["what"])
         writers = {message.data[8:16] for message in flight.raw["/vigil/raw/detection"]}
         self.assertEqual(len(writers), 2, "both processes of the detector")
-        # The second begins anew, so that all of its answers can be computed again.
+        # The second begins anew, so that all of its answers can be computed again. The others may
+        # have begun before there was a black box, and wait for their first state.
         document, services = replayed(path)
-        self.assertTrue(document["identical"], document)
+        self.assertEqual(document["differences"], [])
         self.assertGreater(services["detector"]["compared"], 0, document)
 
     def test_a_recording_of_any_length_is_computed_again_to_the_last_bit(self):
@@ -207,15 +208,16 @@ class BlackBox(unittest.TestCase):
             first = wait_for(lambda: self.blackbox(graph), "a black box")
             time.sleep(3)
             vigil("snapshot", "too much", "--graph", graph.name)
-            cut, *_ = wait_for(lambda: self.recordings("request-cut"), "what there was room for")
+            # A miss of this machine may have come first, and taken all the room.
+            cut, *_ = wait_for(lambda: self.recordings("*cut"), "what there was room for")
             subprocess.run(["mount", "-o", "remount,size=64m", self.folder], check=True)
             vigil("snapshot", "enough", "--graph", graph.name)
             path, *_ = wait_for(lambda: self.recordings("request"), "a recording")
             self.assertEqual(self.blackbox(graph), first, "it was not restarted")
             graph.launcher.terminate()
             _, told = graph.launcher.communicate(timeout=WATCHDOG_S)
-        self.assertEqual(told.count("no recording"), 1, told)
-        self.assertIn("No space left on device", told)
+        self.assertGreaterEqual(told.count("no recording"), 1, told)
+        self.assertEqual(told.count("No space left on device"), told.count("no recording"), told)
         self.assertEqual(Flight(path).about["vigil"]["what"], "enough")
         self.assertTrue(replayed(cut)[0]["is_cut"])
 
