@@ -17,7 +17,7 @@ use vigil_detector::DetectorStage;
 use vigil_identifier::IdentifierStage;
 use vigil_sensor_sim::{SensorSource, SimulatorSource};
 use vigil_setup::{GraphArgs, Setup};
-use vigil_supervisor::{FaultBoard, Steps, SupervisorStage};
+use vigil_supervisor::SupervisorStage;
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
@@ -109,12 +109,8 @@ fn demand_steady(setup: &Setup) {
     let identifier = IdentifierStage::new(identifier, &setup.robot, &graph).unwrap();
     let mut identifier = (stage(Identifier), identifier);
     let validity_ns = vigil_supervisor::validity_ns(setup);
-    let mut steps = Steps {
-        supervisor: vigil_supervisor::assemble(setup).unwrap(),
-        faults: vigil_supervisor::fault_step(setup).unwrap(),
-    };
-    let board = FaultBoard::new(&mut steps.faults, &graph, None, &clock).unwrap();
-    let supervisor = SupervisorStage::new(steps, board, &graph, validity_ns).unwrap();
+    let steps = vigil_supervisor::steps(setup).unwrap();
+    let supervisor = SupervisorStage::new(steps, &graph, validity_ns, None, &clock).unwrap();
     let mut supervisor = (stage(Supervisor), supervisor);
     clock.set(period_ns);
     detector.0.account_mut().ready(&clock).unwrap();

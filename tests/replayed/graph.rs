@@ -22,7 +22,7 @@ use vigil_identifier::IdentifierStage;
 use vigil_sensor_sim::{SensorSource, SimulatorSource};
 use vigil_setup::graph_file::GraphFile;
 use vigil_setup::{Document, GraphArgs, Setup};
-use vigil_supervisor::{FaultBoard, Steps, SupervisorStage};
+use vigil_supervisor::SupervisorStage;
 use vigil_timeline::WallClock;
 
 /// What is recorded, and how it runs.
@@ -294,14 +294,10 @@ fn detector(setup: &Setup, graph: &Graph) -> DetectorStage {
 
 /// Keeps its faults in a file.
 fn supervisor(setup: &Setup, graph: &Graph, kept: &Path, clock: &VirtualClock) -> SupervisorStage {
-    let mut steps = Steps {
-        supervisor: vigil_supervisor::assemble(setup).unwrap(),
-        faults: vigil_supervisor::fault_step(setup).unwrap(),
-    };
+    let steps = vigil_supervisor::steps(setup).unwrap();
     let kept = KeptBlock::open(kept).unwrap();
-    let board = FaultBoard::new(&mut steps.faults, graph, Some(kept), clock).unwrap();
     let validity_ns = vigil_supervisor::validity_ns(setup);
-    SupervisorStage::new(steps, board, graph, validity_ns).unwrap()
+    SupervisorStage::new(steps, graph, validity_ns, Some(kept), clock).unwrap()
 }
 
 /// An operator acknowledges all faults.

@@ -1,8 +1,7 @@
 //! The page of a measurement: the latency of every cell at a glance, as heat maps.
 
 use vigil_cycle::Latency;
-use vigil_pages::chart::{Axis, Chart, Curve, Stroke};
-use vigil_pages::colour::Colour;
+use vigil_pages::chart::{Axis, Chart, Curve};
 use vigil_pages::heat::{Grid, HeatMap, Scale};
 use vigil_pages::page::{KeyEntry, Section, beside, key, page, remark, table, titled};
 use vigil_pages::spectrum::{Spectrum, ends};
@@ -160,12 +159,7 @@ fn edges(rows: usize) -> Vec<f64> {
 /// The deadline of a cell as a broken line through its row.
 fn deadline(cell: &CellFigures, row: usize) -> Curve {
     let place = cell.deadline_us.log10();
-    let points = [row, row + 1].map(|edge| (place, edge as f64));
-    Curve {
-        colour: Colour::Alarm,
-        stroke: Stroke::Dashed,
-        points: points.to_vec(),
-    }
+    Curve::bound([row, row + 1].map(|edge| (place, edge as f64)))
 }
 
 fn plural(count: usize, one: &str) -> String {
@@ -279,11 +273,7 @@ impl LatencyPage {
             scale: Scale::logarithmic("share of the cycles of a cell", &grid.all()),
             grid,
         };
-        let names = key(&[KeyEntry {
-            colour: Colour::Alarm,
-            stroke: Stroke::Dashed,
-            name: "deadline".to_owned(),
-        }]);
+        let names = key(&[KeyEntry::bound("deadline".to_owned())]);
         format!("{names}{}\n", map.svg())
     }
 

@@ -68,6 +68,10 @@ impl Companion {
                     self.restart_at = Some(now + delay);
                 }
                 Err(reason) => {
+                    tell!(
+                        "vigil: the black box ended ({ending}); given up: {reason}; nothing is \
+                         recorded any more"
+                    );
                     let what = format!("{ending}; {reason}; nothing is recorded any more");
                     self.news = Some(CompanionNews::GaveUp(what));
                 }
@@ -78,7 +82,7 @@ impl Companion {
             self.restart_at = None;
             self.history.restarted(now);
             self.spawn(plan, domain);
-            self.news = Some(CompanionNews::Restarted);
+            self.news = self.process.is_some().then_some(CompanionNews::Restarted);
         }
         is_due
     }

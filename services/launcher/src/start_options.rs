@@ -9,7 +9,7 @@ use crate::args::LauncherArgs;
 
 /// Options of a start, for the services. They are left beside the graph, for a launcher that adopts
 /// it.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StartOptions {
     /// What is to be broken; see [`LauncherArgs::inject`].
     pub inject: Vec<String>,

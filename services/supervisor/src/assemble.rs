@@ -4,7 +4,18 @@ use vigil_setup::Setup;
 
 use vigil_decision::{Compensation, FaultLife, FaultRuleError, Supervisor, SupervisorError};
 
-use crate::steps::FaultStep;
+use crate::steps::{FaultStep, Steps};
+
+/// Why there is nothing to compute with.
+#[derive(Debug, thiserror::Error)]
+pub enum StepsError {
+    /// Decision model, tree, robot and settings do not fit together.
+    #[error(transparent)]
+    Supervisor(#[from] SupervisorError),
+    /// A rule is about a fault that does not exist.
+    #[error(transparent)]
+    Faults(#[from] FaultRuleError),
+}
 
 /// Without any belief the robot stops after this long, ns. Chosen by hand: two observations, in
 /// which a robot of 0.2 m/s drives 2 cm.
@@ -50,12 +61,15 @@ pub fn fault_life(setup: &Setup) -> Result<FaultLife, FaultRuleError> {
     FaultLife::new(&setup.file.faults, &setup.tree)
 }
 
-/// The same, fed with what the supervisor takes.
+/// All that the supervisor of a configuration computes.
 ///
 /// # Errors
-/// As [`fault_life`].
-pub fn fault_step(setup: &Setup) -> Result<FaultStep, FaultRuleError> {
-    Ok(FaultStep::new(fault_life(setup)?, setup.tree.hash()))
+/// As [`assemble`] and [`fault_life`].
+pub fn steps(setup: &Setup) -> Result<Steps, StepsError> {
+    Ok(Steps {
+        supervisor: assemble(setup)?,
+        faults: FaultStep::new(fault_life(setup)?, setup.tree.hash()),
+    })
 }
 
 /// How long an action stays valid, ns: long enough to survive a few lost cycles, short enough to

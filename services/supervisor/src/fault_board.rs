@@ -25,8 +25,6 @@ pub struct FaultBoard {
     faults: Box<dyn Sender<Faults>>,
     /// Where they are kept; nowhere in process.
     kept: Option<KeptBlock<Faults>>,
-    /// The block that says what an earlier supervisor has left.
-    restored: Option<BlockId>,
     published_ns: Option<u64>,
     revision_published: u64,
     /// Why they could not be published, until the stage can say so.
@@ -72,13 +70,14 @@ impl Clock for Instant {
 }
 
 impl FaultBoard {
-    /// Opens the ports on `graph`. What another has left in `kept` goes on in `step`, and is
-    /// published again.
+    /// Opens the ports on `graph`. What another has left in `kept` goes on in `step`; it is
+    /// published again, and noted in the `journal`.
     ///
     /// # Errors
     /// The transport's.
     pub fn new(
         step: &mut FaultStep,
+        journal: &mut JournalWriter,
         graph: &Graph,
         kept: Option<KeptBlock<Faults>>,
         clock: &dyn Clock,
@@ -93,20 +92,15 @@ impl FaultBoard {
             peers: [peer(SensorSim)?, peer(Detector)?, peer(Identifier)?],
             faults: graph.sender(Topic::Faults)?,
             kept,
-            restored: None,
             failed: None,
             published_ns: None,
             revision_published: 0,
         };
         if is_restored {
-            board.restored = Some(board.send(step, clock.now_ns())?);
+            let left = board.send(step, clock.now_ns())?;
+            journal.note(JournalEntry::new(JournalKind::Restored, 1).with_input(left));
         }
         Ok(board)
-    }
-
-    /// The block that says what an earlier supervisor has left, if one has.
-    pub(crate) const fn restored(&self) -> Option<BlockId> {
-        self.restored
     }
 
     /// Lets the faults live for a turn, whatever it was, and tells what has changed. What fails is

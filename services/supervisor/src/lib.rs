@@ -5,7 +5,6 @@ mod fault_board;
 mod steps;
 mod wiring;
 
-pub use assemble::{assemble, fault_life, fault_step, validity_ns};
-pub use fault_board::FaultBoard;
+pub use assemble::{StepsError, assemble, fault_life, steps, validity_ns};
 pub use steps::{FaultStep, Steps};
 pub use wiring::SupervisorStage;

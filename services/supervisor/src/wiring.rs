@@ -2,12 +2,12 @@
 
 use vigil_blocks::{
     Action, AnsweredWheels, Cause, CauseKind, ControlMode, DetectionBelief, Entry, EventKind,
-    FaultBelief, JournalEntry, JournalKind, Weighing,
+    FaultBelief, Faults, JournalEntry, JournalKind, Weighing,
 };
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    Clock, Graph, HealthBoard, InputAccount, Intake, JournalWriter, PortError, Receiver, Sender,
-    Stage, Stamp, Topic,
+    Clock, Graph, HealthBoard, InputAccount, Intake, JournalWriter, KeptBlock, PortError, Receiver,
+    Sender, Stage, Stamp, Topic,
 };
 
 use vigil_decision::Inputs;
@@ -66,21 +66,20 @@ struct LastDecision {
 }
 
 impl SupervisorStage {
-    /// Opens the supervisor's ports on `graph`, beside those of the faults. Each action is valid
-    /// for `validity_ns` after its publication.
+    /// Opens the supervisor's ports on `graph`. Each action is valid for `validity_ns` after its
+    /// publication. Faults are kept in `kept`, from which those of an earlier supervisor go on.
     ///
     /// # Errors
     /// The transport's.
     pub fn new(
-        steps: Steps,
-        board: FaultBoard,
+        mut steps: Steps,
         graph: &Graph,
         validity_ns: u64,
+        kept: Option<KeptBlock<Faults>>,
+        clock: &dyn Clock,
     ) -> Result<Self, PortError> {
         let mut journal = JournalWriter::open(graph, ServiceName::Supervisor)?;
-        if let Some(left) = board.restored() {
-            journal.note(JournalEntry::new(JournalKind::Restored, 1).with_input(left));
-        }
+        let board = FaultBoard::new(&mut steps.faults, &mut journal, graph, kept, clock)?;
         Ok(Self {
             steps,
             diagnoses: graph.receiver(Topic::Diagnosis)?,

@@ -48,15 +48,6 @@ impl Default for Latencies {
     }
 }
 
-/// A broken line at the deadline.
-fn bound(points: [(f64, f64); 2]) -> Curve {
-    Curve {
-        colour: Colour::Alarm,
-        stroke: Stroke::Dashed,
-        points: points.to_vec(),
-    }
-}
-
 fn histogram(counts: &Histogram<u64>, deadline_ms: f64) -> String {
     let [least, most] = [counts.min(), counts.max()].map(|ns| ns as f64 * MS);
     let ends = [least, most.max(deadline_ms)];
@@ -85,7 +76,7 @@ fn histogram(counts: &Histogram<u64>, deadline_ms: f64) -> String {
     let mut labels = Vec::new();
     if deadline_ms > 0.0 {
         let place = deadline_ms.log10();
-        curves.push(bound([(place, 0.0), (place, highest)]));
+        curves.push(Curve::bound([(place, 0.0), (place, highest)]));
         // Beside the line, on the side that has room.
         let aside = if place > from + 0.9 * (to - from) {
             0.08
@@ -190,12 +181,8 @@ impl Latencies {
         let (mut curves, mut names) = (Vec::new(), String::new());
         if deadline_ms > 0.0 {
             let place = deadline_ms.log10();
-            curves.push(bound(time.range.map(|t_s| (t_s, place))));
-            names = key(&[KeyEntry {
-                colour: Colour::Alarm,
-                stroke: Stroke::Dashed,
-                name: format!("deadline, {deadline_ms} ms"),
-            }]);
+            curves.push(Curve::bound(time.range.map(|t_s| (t_s, place))));
+            names = key(&[KeyEntry::bound(format!("deadline, {deadline_ms} ms"))]);
         }
         let caption = "End-to-end latency over time";
         let map = HeatMap {

@@ -133,6 +133,18 @@ pub struct Curve {
     pub points: Vec<(f64, f64)>,
 }
 
+impl Curve {
+    /// A broken line at a bound, such as a deadline.
+    #[must_use]
+    pub fn bound(points: [(f64, f64); 2]) -> Self {
+        Self {
+            colour: Colour::Alarm,
+            stroke: Stroke::Dashed,
+            points: points.to_vec(),
+        }
+    }
+}
+
 /// Words in a chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Label {

@@ -137,6 +137,18 @@ pub struct KeyEntry {
     pub name: String,
 }
 
+impl KeyEntry {
+    /// Of [`crate::chart::Curve::bound`].
+    #[must_use]
+    pub const fn bound(name: String) -> Self {
+        Self {
+            colour: Colour::Alarm,
+            stroke: Stroke::Dashed,
+            name,
+        }
+    }
+}
+
 /// Names of the curves of a chart.
 pub fn key(entries: &[KeyEntry]) -> String {
     let entry = |entry: &KeyEntry| {

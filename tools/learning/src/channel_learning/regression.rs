@@ -56,11 +56,9 @@ pub(super) fn fit(
             needed: PER_WEIGHT * terms,
         });
     }
-    let matrix = DMatrix::from_row_slice(values.len(), terms, &rows);
-    let values = DVector::from_vec(values);
     let penalised: Vec<bool> = channel.terms.iter().map(is_penalised).collect();
-    if let Some(weights) = solve(&matrix, &values, &penalised) {
-        channel.weights = weights.iter().copied().collect();
+    if let Some(weights) = solve(&mut rows, &values, &penalised) {
+        channel.weights = weights;
     }
     Ok(())
 }
@@ -70,39 +68,80 @@ fn is_penalised(term: &Term) -> bool {
     term.of != Regressor::Constant
 }
 
-fn solve(matrix: &DMatrix<f64>, values: &DVector<f64>, penalised: &[bool]) -> Option<DVector<f64>> {
+/// The weights of `values` on `rows`, one after the other, each with a value per term. The rows are
+/// standardised in place. None if the terms do not determine their weights.
+fn solve(rows: &mut [f64], values: &[f64], penalised: &[bool]) -> Option<Vec<f64>> {
     let count = values.len() as f64;
-    let scale: Vec<f64> = matrix
-        .column_iter()
-        .map(|column| (column.norm_squared() / count).sqrt().max(SIZE_MIN))
-        .collect();
-    let mut scaled = matrix.clone();
-    for (mut column, scale) in scaled.column_iter_mut().zip(&scale) {
-        column /= *scale;
-    }
-    let mut trust = DVector::from_element(values.len(), 1.0);
+    let scale = standardise(rows, penalised.len(), count);
+    let mut trust = vec![1.0; values.len()];
     let mut solution = DVector::zeros(scale.len());
     for _ in 0..ROUNDS {
-        let mut weighted = scaled.clone();
-        for (mut row, trust) in weighted.row_iter_mut().zip(trust.iter()) {
-            row *= *trust;
-        }
-        let mut normal = scaled.tr_mul(&weighted);
+        let (mut normal, vector) = normal_equations(rows, values, &trust, scale.len());
         for (i, _) in penalised.iter().enumerate().filter(|(_, is)| **is) {
             normal[(i, i)] += RIDGE * count;
         }
-        solution = normal.cholesky()?.solve(&weighted.tr_mul(values));
-        let residual = values - &scaled * &solution;
-        let mut sizes: Vec<f64> = residual.iter().map(|value| value.abs()).collect();
+        solution = normal.cholesky()?.solve(&vector);
+        let residuals = rows.chunks_exact(scale.len()).zip(values);
+        let residuals = residuals.map(|(row, value)| {
+            let predicted: f64 = row
+                .iter()
+                .zip(&solution)
+                .map(|(x, weight)| x * weight)
+                .sum();
+            (value - predicted).abs()
+        });
+        let residuals: Vec<f64> = residuals.collect();
+        let mut sizes = residuals.clone();
         let middle = sizes.len() / 2;
         let deviation = 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 + 1e-12;
-        trust = residual.map(|value| 1.0 / (value.abs() / deviation / HUBER).max(1.0));
+        for (trust, residual) in trust.iter_mut().zip(residuals) {
+            *trust = 1.0 / (residual / deviation / HUBER).max(1.0);
+        }
     }
-    for (value, scale) in solution.iter_mut().zip(&scale) {
-        *value /= scale;
+    let weights = solution.iter().zip(&scale);
+    let weights: Vec<f64> = weights.map(|(weight, scale)| weight / scale).collect();
+    let are_finite = weights.iter().all(|weight| weight.is_finite());
+    are_finite.then_some(weights)
+}
+
+/// Divides each term by its root mean square, which is returned.
+fn standardise(rows: &mut [f64], terms: usize, count: f64) -> Vec<f64> {
+    let mut scale = vec![0.0; terms];
+    for row in rows.chunks_exact(terms) {
+        for (sum, x) in scale.iter_mut().zip(row) {
+            *sum += x * x;
+        }
     }
-    solution
-        .iter()
-        .all(|value| value.is_finite())
-        .then_some(solution)
+    for sum in &mut scale {
+        *sum = (*sum / count).sqrt().max(SIZE_MIN);
+    }
+    for row in rows.chunks_exact_mut(terms) {
+        for (x, scale) in row.iter_mut().zip(&scale) {
+            *x /= scale;
+        }
+    }
+    scale
+}
+
+/// Weighted sums of products of the terms, of which the lower triangle is filled, and of the terms
+/// and the values. All pairs are taken from a row while it is at hand: a long log is read once.
+fn normal_equations(
+    rows: &[f64],
+    values: &[f64],
+    trust: &[f64],
+    terms: usize,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let mut normal = DMatrix::zeros(terms, terms);
+    let mut vector = DVector::zeros(terms);
+    for ((row, value), trust) in rows.chunks_exact(terms).zip(values).zip(trust) {
+        for (i, x) in row.iter().enumerate() {
+            let weighted = trust * x;
+            vector[i] += weighted * value;
+            let sums = &mut normal.as_mut_slice()[i * terms + i..(i + 1) * terms];
+            for (sum, other) in sums.iter_mut().zip(&row[i..]) {
+                *sum += weighted * other;
+            }
+        }
+    }
+    (normal, vector)
 }
