@@ -3,14 +3,14 @@
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 /// How a recording ends that is not finished.
 const PART: &str = ".mcap.part";
 /// How one ends that is.
 const WHOLE: &str = ".mcap";
-/// How one ends that nothing but missed cycles is the reason of.
-const MISS: &str = "-miss.mcap";
+/// How one ends that nothing but missed cycles is the reason of, whole or cut short.
+const MISS: [&str; 2] = ["-miss.mcap", "-miss-cut.mcap"];
 
 /// A graph's folder of recordings, of bounded size. Other files in it are nobody's business here.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -70,7 +70,7 @@ impl RecordingsFolder {
             sum = sum.saturating_add(file.bytes);
         }
         files.pop();
-        files.sort_by_key(|file| !file.path.to_string_lossy().ends_with(MISS));
+        files.sort_by_key(|file| !file.is_of_misses());
         for file in &files {
             if sum <= self.bytes_max {
                 break;
@@ -79,6 +79,14 @@ impl RecordingsFolder {
                 sum = sum.saturating_sub(file.bytes);
             }
         }
+    }
+
+    /// Time since the last recording that only missed cycles are the reason of.
+    pub fn since_misses(&self) -> Option<Duration> {
+        let files = self.files(WHOLE).into_iter();
+        let files = files.filter(RecordingFile::is_of_misses);
+        let ages = files.filter_map(|file| file.modified.elapsed().ok());
+        ages.min()
     }
 
     /// The graph's own files that end so.
@@ -127,10 +135,16 @@ struct RecordingFile {
     modified: SystemTime,
 }
 
+impl RecordingFile {
+    fn is_of_misses(&self) -> bool {
+        let name = self.path.to_string_lossy();
+        MISS.iter().any(|end| name.ends_with(end))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::time::Duration;
     use vigil_flight::part_path;
 
     fn folder(path: &Path, bytes_max: u64) -> RecordingsFolder {
@@ -176,8 +190,10 @@ mod tests {
             all.sort();
             all
         };
+        assert!(folder.since_misses().unwrap() >= Duration::from_secs(30));
         folder.prune(0);
         assert_eq!(left(&folder), with_others(&[&old, &new]));
+        assert_eq!(folder.since_misses(), None);
         folder.prune(100);
         assert_eq!(left(&folder), with_others(&[&new]));
         folder.prune(1000);
@@ -201,6 +217,17 @@ mod tests {
             left(&folder),
             ["mine.mcap.part", &format!("{name}-cut.mcap")]
         );
+    }
+
+    #[test]
+    fn misses_count_although_their_recording_was_cut_short() {
+        let temporary = tempfile::tempdir().unwrap();
+        let folder = folder(temporary.path(), 1000);
+        let miss = folder.name("2026-11-28T18:00:01.250Z", "miss");
+        fs::write(part_path(&miss), "x").unwrap();
+        assert_eq!(folder.since_misses(), None);
+        folder.adopt_parts();
+        assert!(folder.since_misses().is_some());
     }
 
     #[test]

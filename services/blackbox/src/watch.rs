@@ -30,10 +30,13 @@ pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     let folder = folder(&running)?;
     let path = folder.path().as_os_str().as_encoded_bytes();
     fs::write(running.domain.recordings_file(), path)?;
+    // Also of a process before this one: each start would write a recording otherwise.
+    let since_misses_ns = folder.since_misses().map(|time| time.as_nanos() as u64);
+    let miss_ns = since_misses_ns.and_then(|since_ns| Monotonic.now_ns().checked_sub(since_ns));
     let material = Arc::new(Material::new(running, Destination::Folder(folder))?);
     let domain = &material.running.domain;
     let mut rescue = set_aside(&domain.ring_file()).and_then(|left| Rescue::start(&material, left));
-    let kept = keep(&material, &mut rescue);
+    let kept = keep(&material, miss_ns, &mut rescue);
     // Whatever happened: what was left is written before this process ends.
     rescue.into_iter().for_each(Rescue::finish);
     kept?;
@@ -110,8 +113,13 @@ impl Rescue {
     }
 }
 
-/// Keeps the last seconds, and writes them when there is a reason.
-fn keep(material: &Arc<Material>, rescue: &mut Option<Rescue>) -> Result<(), Box<dyn Error>> {
+/// Keeps the last seconds, and writes them when there is a reason. Missed cycles were last one at
+/// `miss_ns`.
+fn keep(
+    material: &Arc<Material>,
+    miss_ns: Option<u64>,
+    rescue: &mut Option<Rescue>,
+) -> Result<(), Box<dyn Error>> {
     let (domain, setup) = (&material.running.domain, &material.running.setup);
     let settings = &setup.file.blackbox;
     let ring = RingWriter::create(&domain.ring_file(), settings.memory_bytes())?;
@@ -120,7 +128,7 @@ fn keep(material: &Arc<Material>, rescue: &mut Option<Rescue>) -> Result<(), Box
         before_ns: (settings.before_s * NS) as u64,
         after_ns: (settings.after_s * NS) as u64,
         miss_pause_ns: (settings.miss_pause_s * NS) as u64,
-        miss_ns: None,
+        miss_ns,
         material: Arc::clone(material),
         ring,
         recordings: Vec::new(),
