@@ -130,7 +130,7 @@ class Record(unittest.TestCase):
             graph = ["--config", config / "rover.toml", "--graph", name, "--source", "external", "--rate", "20"]
             process = publisher("publisher.py", FRAMES, STUCK_RUN, name, 20)
             try:
-                done = vigil("record", *graph, "--out", frames, "--seconds", "4", "--json")
+                done = vigil("record", *graph, "--out", frames, "--duration", "4", "--json")
             finally:
                 process.terminate()
                 process.communicate(timeout=20)
@@ -155,7 +155,7 @@ class Record(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             frames = pathlib.Path(folder) / "frames.csv"
             name = f"py{os.getpid()}-silent"
-            done = vigil("record", "--graph", name, "--source", "external", "--out", frames, "--seconds", "1")
+            done = vigil("record", "--graph", name, "--source", "external", "--out", frames, "--duration", "1")
             self.assertEqual((done.returncode, frames.exists()), (1, False), done.stderr)
             self.assertIn("no frame came", done.stdout)
 

@@ -16,7 +16,7 @@ use vigil_setup::RunningGraph;
 
 use crate::feeds::Feeds;
 use crate::reason::Reason;
-use crate::recorder::{Cause, Destination, Material, Order, Recording, Written};
+use crate::recorder::{Cause, Destination, Material, Order, Recording, RecordingError, Written};
 use crate::ring::RingWriter;
 use crate::watch;
 
@@ -28,7 +28,7 @@ const TOLD: Duration = Duration::from_secs(1);
 const MIB: f64 = (1 << 20) as f64;
 
 /// Records into `path` until the duration is over, somebody ends it, or the graph ends. What lies
-/// at `path` is replaced. True if there was something to record.
+/// at `path` is replaced by it. True if there was something to record.
 ///
 /// # Errors
 /// The transport's, and those of the file. What was written by then stays, with `.part` after its
@@ -42,21 +42,25 @@ pub fn run(
     watch::keep_off(&running.setup);
     let destination = Destination::File(path.to_owned());
     let material = Arc::new(Material::new(running, destination)?);
-    let written = record(&material, path, duration)?;
-    if written.blocks == 0 {
-        fs::remove_file(&written.path)?;
-        watch::say("nothing was recorded");
-        return Ok(false);
+    match record(&material, path, duration)?.finish() {
+        Ok(written) => {
+            tell(&written)?;
+            Ok(true)
+        }
+        Err(nothing @ RecordingError::Nothing) => {
+            watch::say(&nothing.to_string());
+            Ok(false)
+        }
+        Err(error) => Err(error.into()),
     }
-    tell(&written)?;
-    Ok(true)
 }
 
+/// Takes what comes until the end; the recording that is still being written.
 fn record(
     material: &Arc<Material>,
     path: &Path,
     duration: Option<Duration>,
-) -> Result<Written, Box<dyn Error>> {
+) -> Result<Recording, Box<dyn Error>> {
     let running = &material.running;
     let (mut ring, mut progress) = (ring(running)?, Progress::new(path));
     let mut feeds = Feeds::open(&Graph::SharedMemory(Link::join(&running.domain, "record")?))?;
@@ -74,7 +78,7 @@ fn record(
     if is_deserted {
         watch::say("the graph has ended");
     }
-    Ok(recording.finish()?)
+    Ok(recording)
 }
 
 /// A ring of its own beside that of the graph's black box; it is gone with this process.

@@ -37,6 +37,9 @@ pub enum RecordingError {
     /// The launcher's events cannot be read.
     #[error("the file of events: {0}")]
     Events(io::Error),
+    /// Nothing came, and what lay in the place of the file stays.
+    #[error("nothing was recorded")]
+    Nothing,
     /// The thread that writes has ended otherwise.
     #[error("the thread that writes has failed")]
     Thread,
@@ -225,8 +228,11 @@ fn write(
             Ok(written)
         }
         Err(error) => {
-            if let Destination::Folder(_) = destination {
-                folder::adopt(&part_path(&path));
+            let part = part_path(&path);
+            match (&error, destination) {
+                (RecordingError::Nothing, _) => _ = std::fs::remove_file(part),
+                (_, Destination::Folder(_)) => _ = folder::adopt(&part),
+                (_, Destination::File(_)) => {}
             }
             Err(error)
         }
@@ -330,6 +336,9 @@ impl Filling<'_> {
         about.insert("lost".to_owned(), lost.to_string());
         about.insert("gaps".to_owned(), gaps.to_string());
         self.file.metadata("vigil", &about)?;
+        if self.blocks == 0 {
+            return Err(RecordingError::Nothing);
+        }
         let finished = self.file.finish()?;
         let [first_ns, last_ns] = self.bounds_ns.unwrap_or_default();
         let written = Written {

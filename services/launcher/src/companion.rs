@@ -82,7 +82,9 @@ impl Companion {
             self.restart_at = None;
             self.history.restarted(now);
             self.spawn(plan, domain);
-            self.news = self.process.is_some().then_some(CompanionNews::Restarted);
+            if self.process.is_some() {
+                self.news = Some(CompanionNews::Restarted);
+            }
         }
         is_due
     }
@@ -99,7 +101,11 @@ impl Companion {
         };
         match Process::start(command) {
             Ok(process) => self.process = Some(process),
-            Err(error) => tell!("vigil: nothing is recorded: {error}"),
+            Err(error) => {
+                tell!("vigil: nothing is recorded: {error}");
+                let what = format!("nothing is recorded: {error}");
+                self.news = Some(CompanionNews::GaveUp(what));
+            }
         }
     }
 

@@ -314,7 +314,7 @@ impl Watch<'_> {
     fn tell_of_blackbox(&mut self, observer: &HealthObserver, children: &mut Children) {
         let (event, what) = match children.take_blackbox_news() {
             Some(CompanionNews::Restarted) => ("restarted", String::new()),
-            Some(CompanionNews::GaveUp(what)) => ("gave up", what),
+            Some(CompanionNews::GaveUp(what)) => ("gave-up", what),
             None => return,
         };
         self.teller

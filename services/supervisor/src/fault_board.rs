@@ -116,7 +116,8 @@ impl FaultBoard {
             let Some(frame) = self.frames.take_next() else {
                 break;
             };
-            if frame.header.schema == SensorFrame::SCHEMA {
+            // Without an epoch it could not be named.
+            if frame.header.schema == SensorFrame::SCHEMA && frame.header.epoch != 0 {
                 let entry = JournalEntry::new(JournalKind::Kept, 1);
                 journal.note(entry.with_input(frame.header.id()));
                 step.keep(frame);

@@ -73,10 +73,10 @@ impl FaultFinding {
     fn words(&self) -> String {
         let (name, time, p) = (&self.name, self.time(), self.p);
         match self.kind {
-            FaultKind::Part => format!("{name} {time}, with a probability of {p:.3}"),
+            FaultKind::Part => format!("{name} {time}, with a probability of up to {p:.3}"),
             FaultKind::Unknown => format!(
                 "something that no fault of the tree explains ({name}) {time}, with a probability \
-                 of {p:.3}"
+                 of up to {p:.3}"
             ),
             FaultKind::Input => format!("the input ({name}) {time}"),
             FaultKind::Service => format!("the service {name} {time}"),
@@ -211,8 +211,8 @@ mod tests {
             overall: Some(OverallState::Fault),
             ..healthy()
         };
-        let wanted = "This was wrong: RM_STUCK since 8.6 s (18:57:11 UTC), with a probability of \
-                      0.998. What was done: stop from 8.6 s, compensate:RM from 9.1 s. At the end \
+        let wanted = "This was wrong: RM_STUCK since 8.6 s (18:57:11 UTC), with a probability of up \
+                      to 0.998. What was done: stop from 8.6 s, compensate:RM from 9.1 s. At the end \
                       RM_STUCK is active, the action is compensate:RM, the overall state is fault.";
         assert_eq!(findings.verdict(), wanted);
     }

@@ -204,7 +204,7 @@ fn a_drive_with_a_fault_has_a_page_that_names_it() {
     let html = vigil_flight_page::page(&write(&folder, BROKEN)).unwrap();
     check(&html);
     for wanted in [
-        "This was wrong: RM_STUCK since 6.0 s (22:13:31 UTC), with a probability of 0.970.",
+        "This was wrong: RM_STUCK since 6.0 s (22:13:31 UTC), with a probability of up to 0.970.",
         "What was done: ",
         "At the end RM_STUCK is active",
         "an &lt;odd&gt; noise &amp; more",

@@ -1,5 +1,6 @@
 //! Recorded blocks of the last seconds, by what identifies them.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, VecDeque};
 
 use vigil_blocks::{
@@ -36,8 +37,11 @@ impl<T> Window<T> {
     /// Adds a block that came at `now_ns`; those that are too old by then go.
     pub(crate) fn insert(&mut self, id: BlockId, now_ns: u64, block: Box<T>) {
         let key = (id.epoch, id.seq);
-        self.blocks.insert(key, block);
-        self.order.push_back((now_ns, key));
+        // A number that is repeated is refused by those who take blocks: the first counts.
+        if let Entry::Vacant(place) = self.blocks.entry(key) {
+            place.insert(block);
+            self.order.push_back((now_ns, key));
+        }
         while let Some((then_ns, oldest)) = self.order.front().copied()
             && now_ns.saturating_sub(then_ns) > self.kept_ns
         {

@@ -15,10 +15,11 @@ pub struct Tally {
     pub answers: u64,
     /// Those that were computed again, and whose block was recorded.
     pub compared: u64,
+    /// Of the compared answers and states, those that are not the same to the last bit; and entries
+    /// at which a step failed that had not failed in the service.
+    pub different: u64,
     /// Those that were computed again, and whose block was not recorded.
     pub unrecorded: u64,
-    /// Of these, the ones that are not the same to the last bit.
-    pub different: u64,
     /// States that were compared with what was handed out.
     pub states: u64,
     /// Times at which a service began to be computed: its start, or a state.

@@ -52,11 +52,11 @@ pub struct Args {
     )]
     file: Option<PathBuf>,
     /// The same as FILE.
-    #[arg(long, value_name = "F")]
+    #[arg(short, long, value_name = "F")]
     out: Option<PathBuf>,
     /// Time to record, s; until Ctrl-C if it is not given.
-    #[arg(long, value_name = "S", visible_alias = "duration")]
-    seconds: Option<f64>,
+    #[arg(long, value_name = "S", visible_alias = "seconds")]
+    duration: Option<f64>,
     /// Replace FILE if it is there. A table of frames is replaced without it.
     #[arg(long)]
     force: bool,
@@ -95,9 +95,9 @@ pub struct Document {
 /// Options that do not go together, a configuration that is refused, a graph that does not run, a
 /// file that cannot be written, a transport that fails.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let seconds = args.seconds.unwrap_or(f64::INFINITY);
+    let seconds = args.duration.unwrap_or(f64::INFINITY);
     if seconds.is_nan() || seconds < 0.1 {
-        let message = format!("--seconds {seconds}: allowed is 0.1 or more");
+        let message = format!("--duration {seconds}: allowed is 0.1 or more");
         return Err(CommandError::usage(message));
     }
     match (flight::is_meant(args.path()), args.force) {

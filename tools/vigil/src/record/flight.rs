@@ -48,7 +48,7 @@ pub fn record(args: &Args) -> Result<Infallible, CommandError> {
     eprintln!("recording graph '{graph}'; end with Ctrl-C");
     let mut words: Vec<OsString> = vec!["--graph".into(), graph.into()];
     words.extend(["--record".into(), path.into()]);
-    if let Some(seconds) = args.seconds {
+    if let Some(seconds) = args.duration {
         words.extend(["--duration".into(), seconds.to_string().into()]);
     }
     let program = beside::Program {
