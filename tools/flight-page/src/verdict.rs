@@ -211,9 +211,10 @@ mod tests {
             overall: Some(OverallState::Fault),
             ..healthy()
         };
-        let wanted = "This was wrong: RM_STUCK since 8.6 s (18:57:11 UTC), with a probability of up \
-                      to 0.998. What was done: stop from 8.6 s, compensate:RM from 9.1 s. At the end \
-                      RM_STUCK is active, the action is compensate:RM, the overall state is fault.";
+        let wanted = "This was wrong: RM_STUCK since 8.6 s (18:57:11 UTC), with a probability of \
+                      up to 0.998. What was done: stop from 8.6 s, compensate:RM from 9.1 s. At \
+                      the end RM_STUCK is active, the action is compensate:RM, the overall state \
+                      is fault.";
         assert_eq!(findings.verdict(), wanted);
     }
 
@@ -240,8 +241,8 @@ mod tests {
         };
         let text = several.verdict();
         let wanted = "2 faults were present: RM_STUCK since 8.6 s (18:57:11 UTC), with a \
-                      probability of 0.998; the service detector since before the recording began, \
-                      until 12.0 s.";
+                      probability of up to 0.998; the service detector since before the recording \
+                      began, until 12.0 s.";
         assert!(text.starts_with(wanted), "{text}");
         assert!(
             text.contains("At the end RM_STUCK is active, detector is over,"),
