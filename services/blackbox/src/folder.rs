@@ -9,8 +9,10 @@ use std::time::{Duration, SystemTime};
 const PART: &str = ".mcap.part";
 /// How one ends that is.
 const WHOLE: &str = ".mcap";
-/// How one ends that nothing but missed cycles is the reason of, whole or cut short.
-const MISS: [&str; 2] = ["-miss.mcap", "-miss-cut.mcap"];
+/// How the name of one ends that was cut short, and of one that nothing but missed cycles is the
+/// reason of.
+const CUT: &str = "-cut";
+const MISS: &str = "-miss";
 
 /// A graph's folder of recordings, of bounded size. Other files in it are nobody's business here.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -116,7 +118,7 @@ pub fn adopt(part: &Path) -> Option<PathBuf> {
         return None;
     }
     let name = part.file_name()?.to_str()?.strip_suffix(PART)?;
-    let cut = part.with_file_name(format!("{name}-cut{WHOLE}"));
+    let cut = part.with_file_name(format!("{name}{CUT}{WHOLE}"));
     fs::rename(part, &cut).ok()?;
     Some(cut)
 }
@@ -137,8 +139,9 @@ struct RecordingFile {
 
 impl RecordingFile {
     fn is_of_misses(&self) -> bool {
-        let name = self.path.to_string_lossy();
-        MISS.iter().any(|end| name.ends_with(end))
+        let name = self.path.file_stem().unwrap_or_default();
+        let name = name.to_string_lossy();
+        name.strip_suffix(CUT).unwrap_or(&name).ends_with(MISS)
     }
 }
 

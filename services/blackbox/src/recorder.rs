@@ -327,6 +327,9 @@ impl Filling<'_> {
         self.file.metadata("vigil", &about)?;
         let lost_before = material.lost.load(Ordering::Relaxed);
         self.fill_until_end()?;
+        if self.blocks == 0 {
+            return Err(RecordingError::Nothing);
+        }
         let mut causes = self.orders.causes().all.clone();
         causes.sort();
         let gravest = causes.first().unwrap_or(&self.order.cause).clone();
@@ -336,9 +339,6 @@ impl Filling<'_> {
         about.insert("lost".to_owned(), lost.to_string());
         about.insert("gaps".to_owned(), gaps.to_string());
         self.file.metadata("vigil", &about)?;
-        if self.blocks == 0 {
-            return Err(RecordingError::Nothing);
-        }
         let finished = self.file.finish()?;
         let [first_ns, last_ns] = self.bounds_ns.unwrap_or_default();
         let written = Written {

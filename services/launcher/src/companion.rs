@@ -102,8 +102,8 @@ impl Companion {
         match Process::start(command) {
             Ok(process) => self.process = Some(process),
             Err(error) => {
-                tell!("vigil: nothing is recorded: {error}");
                 let what = format!("nothing is recorded: {error}");
+                tell!("vigil: {what}");
                 self.news = Some(CompanionNews::GaveUp(what));
             }
         }

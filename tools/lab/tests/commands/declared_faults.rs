@@ -1,17 +1,15 @@
 //! The page "Faults of your own", followed on the recordings of an aircraft; refusals of labels.
 
 use std::collections::BTreeSet;
-use std::fs::{self, File};
-use std::io::Read;
+use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use flate2::read::GzDecoder;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::workplace::{commands, data, root, workplace};
+use super::workplace::{commands, cut, data, root, workplace};
 
 fn vigil(folder: &Path, words: &[String]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_vigil-lab"));
@@ -37,25 +35,14 @@ fn flights(data: &Path) -> TempDir {
 /// Writes every other flight of the folder, and its labels.
 fn halve(folder: &Path) {
     let labels = fs::read_to_string(folder.join("labels.csv")).unwrap();
-    let labels: Vec<&str> = labels
-        .lines()
-        .enumerate()
-        .filter(|(i, _)| *i == 0 || i % 2 == 1)
-        .map(|(_, row)| row)
-        .collect();
-    let runs: BTreeSet<&str> = labels
-        .iter()
-        .filter_map(|row| row.split(',').next())
-        .collect();
-    let mut frames = String::new();
-    let packed = File::open(folder.join("alfa.csv.gz")).unwrap();
-    GzDecoder::new(packed).read_to_string(&mut frames).unwrap();
-    let kept = frames
-        .lines()
-        .filter(|row| row.split(',').next().is_some_and(|run| runs.contains(run)));
-    let kept: Vec<&str> = kept.collect();
-    fs::write(folder.join("half.csv"), kept.join("\n")).unwrap();
-    fs::write(folder.join("half-labels.csv"), labels.join("\n")).unwrap();
+    let (head, rows) = labels.split_once('\n').unwrap();
+    let rows: Vec<&str> = rows.lines().step_by(2).collect();
+    let runs = rows.iter().map(|row| row.split(',').next().unwrap());
+    let runs: BTreeSet<u32> = runs.map(|run| run.parse().unwrap()).collect();
+    let (from, to) = (folder.join("alfa.csv.gz"), folder.join("half.csv"));
+    cut(&from, &to, |run, _| runs.contains(&run));
+    let half = format!("{head}\n{}", rows.join("\n"));
+    fs::write(folder.join("half-labels.csv"), half).unwrap();
 }
 
 fn printed(output: &Output) -> String {

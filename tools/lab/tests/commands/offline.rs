@@ -1,15 +1,13 @@
 //! The offline commands as a user runs them: `learn`, `evaluate`, `diagnose`.
 
-use std::fs::{self, File};
-use std::io::Read;
+use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use flate2::read::GzDecoder;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::workplace::root;
+use super::workplace::{cut, root};
 
 const FRAMES: &str = "tests/data/rover/learn_frames.csv.gz";
 const MODEL: &str = "config/models/rover.toml";
@@ -41,21 +39,6 @@ fn learned() -> (TempDir, String, Value) {
         "learn", "--frames", FRAMES, "--runs", RUNS, "--out", &model, "--json",
     ]);
     (folder, model, report)
-}
-
-/// Rows of the frames file that `keep` wants, by run and time, as a plain table.
-fn cut(to: &Path, keep: impl Fn(u32, f64) -> bool) {
-    let mut text = String::new();
-    let file = File::open(root().join(FRAMES)).unwrap();
-    GzDecoder::new(file).read_to_string(&mut text).unwrap();
-    let mut lines = text.lines();
-    let mut kept = vec![lines.next().unwrap()];
-    kept.extend(lines.filter(|line| {
-        let mut fields = line.split(',');
-        let run = fields.next().unwrap().parse().unwrap();
-        keep(run, fields.next().unwrap().parse().unwrap())
-    }));
-    fs::write(to, kept.join("\n")).unwrap();
 }
 
 /// How many times the sensor's noise a residual may be: a tenth more than it. The yaw of a rover
@@ -128,7 +111,7 @@ fn a_learned_model_names_the_faults_of_runs_left_out() {
 
     // Of the other ways to evaluate, a third of the runs tells enough.
     let third = folder.path().join("third.csv");
-    cut(&third, |run, _| run % 3 == 0);
+    cut(&root().join(FRAMES), &third, |run, _| run % 3 == 0);
     let third = third.display().to_string();
     let held_out_in_third = held_out.iter().filter(|run| *run % 3 == 0).count();
     let evaluate = on(&third);
@@ -153,7 +136,9 @@ fn a_learned_model_names_the_faults_of_runs_left_out() {
 
     // Not one run of this file was left out: a clear refusal, not an empty score.
     let frames = folder.path().join("few.csv");
-    cut(&frames, |run, _| run < 9 && !held_out.contains(&run));
+    cut(&root().join(FRAMES), &frames, |run, _| {
+        run < 9 && !held_out.contains(&run)
+    });
     let few = frames.display().to_string();
     let refused = run(&[
         "evaluate", "--model", &model, "--frames", &few, "--runs", RUNS,
@@ -178,7 +163,7 @@ fn verdicts_are_causal() {
     for sensors in ["pose", "pose+encoders"] {
         let diagnose = |name: &str, keep: &dyn Fn(u32, f64) -> bool| {
             let (frames, out) = (folder.path().join("in.csv"), folder.path().join(name));
-            cut(&frames, keep);
+            cut(&root().join(FRAMES), &frames, keep);
             let paths = [frames, out.clone()].map(|path| path.display().to_string());
             let output = run(&[
                 "diagnose",

@@ -1,9 +1,12 @@
 //! Where commands run: the project's folder, and folders that look like it.
 
+use std::fs::{self, File};
+use std::io::Read;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use flate2::read::GzDecoder;
 use tempfile::TempDir;
 
 /// The project's folder.
@@ -44,4 +47,19 @@ pub fn commands(page: &str) -> Vec<Vec<String>> {
     let lines = lines.filter_map(|line| line.strip_prefix("target/release/vigil "));
     let words = |line: &str| line.split(' ').map(str::to_owned).collect();
     lines.map(words).collect()
+}
+
+/// Rows of a packed table of frames that `keep` wants, by run and time, as a plain table.
+pub fn cut(from: &Path, to: &Path, keep: impl Fn(u32, f64) -> bool) {
+    let mut text = String::new();
+    let file = File::open(from).unwrap();
+    GzDecoder::new(file).read_to_string(&mut text).unwrap();
+    let mut lines = text.lines();
+    let mut kept = vec![lines.next().unwrap()];
+    kept.extend(lines.filter(|line| {
+        let mut fields = line.split(',');
+        let run = fields.next().unwrap().parse().unwrap();
+        keep(run, fields.next().unwrap().parse().unwrap())
+    }));
+    fs::write(to, kept.join("\n")).unwrap();
 }
