@@ -71,6 +71,11 @@ class BlackBox(unittest.TestCase):
         listed = json.loads(vigil("list", "--json").stdout)["graphs"]
         return next((of["blackbox"] for of in listed if of["name"] == graph.name), None)
 
+    def states(self, graph):
+        """Of its faults, by name."""
+        listed = json.loads(vigil("faults", "--json", "--graph", graph.name).stdout)["faults"]
+        return {fault["name"]: fault["state"] for fault in listed}
+
     def test_an_alarm_is_written_with_what_was_before_and_after_it(self):
         with Graph("--inject", "stuck:RM@4", "--duration", "60", recordings=self.folder) as graph:
             path, *_ = wait_for(lambda: self.recordings("alarm"), "a recording")
@@ -136,7 +141,7 @@ class BlackBox(unittest.TestCase):
         with Graph("--duration", "60", recordings=self.folder) as graph:
             graph.wait_until_up()
             first = wait_for(lambda: self.blackbox(graph), "a black box")
-            ring = graph.wait_until_up() / "ring"
+            ring = graph.wait_until_up() / "memory/ring"
             wait_for(lambda: ring.exists() and "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
             killed_ns = time.time_ns()
             os.kill(first, signal.SIGKILL)
@@ -178,10 +183,18 @@ class BlackBox(unittest.TestCase):
         with Graph("--inject", "stuck:RM@14", "--duration", "60", recordings=self.folder, before_s=30.0) as graph:
             graph.wait_until_up()
             wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
-            said = vigil("record", path, "--graph", graph.name, "--duration", "25")
-            self.assertEqual(said.returncode, 0, said)
+            command = [BINARIES / "vigil", "record", path, "--graph", graph.name, "--duration", "25"]
+            with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as recorder:
+                # The order is computed again, too, though nobody has recorded its block.
+                state = lambda: self.states(graph).get("RM_STUCK")
+                wait_for(lambda: state() == "active", "the fault")
+                said = vigil("ack", "RM_STUCK", "--graph", graph.name)
+                self.assertEqual(said.returncode, 0, said)
+                wait_for(lambda: state() == "acknowledged", "the order")
+                said, _ = recorder.communicate(timeout=WATCHDOG_S)
+            self.assertEqual(recorder.returncode, 0, said)
             # So much of it, but for a pause of the machine.
-            self.assertRegex(said.stdout, rf"^{path}: 2[45]\.")
+            self.assertRegex(said, rf"^{path}: 2[45]\.")
             again = vigil("record", path, "--graph", graph.name)
             self.assertEqual((again.returncode, "--force" in again.stderr), (2, True), again)
             kept, *_ = wait_for(lambda: self.recordings("alarm"), "a recording")
@@ -190,6 +203,7 @@ class BlackBox(unittest.TestCase):
         self.assertEqual(flight.about["vigil"]["reason"], "record")
         told = [message.msg for _, message in flight.messages["/vigil/events"]]
         self.assertTrue(any("alarm" in text for text in told), told)
+        self.assertTrue(any("RM_STUCK" in text and "acknowledged" in text for text in told), told)
         # The graph's own black box was not disturbed.
         for recording in [path, kept]:
             document, services = replayed(recording)
@@ -220,6 +234,37 @@ class BlackBox(unittest.TestCase):
         self.assertEqual(told.count("No space left on device"), told.count("no recording"), told)
         self.assertEqual(Flight(path).about["vigil"]["what"], "enough")
         self.assertTrue(replayed(cut)[0]["is_cut"])
+
+    def test_what_a_killed_black_box_kept_waits_for_room_even_beyond_the_end_of_its_graph(self):
+        mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "vigil-test", self.folder]
+        if subprocess.run(mount, stderr=subprocess.DEVNULL).returncode != 0:
+            self.skipTest("mounting a small disk needs root")
+        self.addCleanup(subprocess.run, ["umount", self.folder], check=True)
+        killed = []
+        with Graph("--duration", "60", recordings=self.folder) as graph:
+            folder = graph.wait_until_up()
+            unwritten = lambda: sorted(path.name for path in folder.glob("unwritten-*"))
+            wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            for count in [1, 2]:
+                found = wait_for(lambda: self.blackbox(graph) not in killed and self.blackbox(graph), "a black box")
+                wait_for(lambda: (folder / "memory/ring").exists() and len(unwritten()) == count - 1, "its memory")
+                time.sleep(1)
+                os.kill(found, signal.SIGKILL)
+                killed += [None, found]
+            wait_for(lambda: len(unwritten()) == 2, "what both kept")
+            wait_for(lambda: (folder / "memory/ring").exists(), "the third")
+            graph.stop()
+        self.assertEqual(unwritten(), ["unwritten-1", "unwritten-2"])
+        self.assertFalse((folder / "memory").exists())
+        subprocess.run(["mount", "-o", "remount,size=64m", self.folder], check=True)
+        # A graph of this name that has nothing to do with it.
+        with Graph("--rate", "50", "--duration", "1", name=graph.name) as again:
+            again.wait_until_up()
+            self.assertEqual(unwritten(), [])
+        first, second = map(Flight, self.recordings("crash"))
+        for flight in [first, second]:
+            self.assertIn(b"rate_hz = 100", flight.attachments["document.toml"])
+            self.assertGreater(len(flight.raw["/vigil/raw/sensor"]), 50)
 
     def test_a_recording_ends_with_a_signal_or_its_graph(self):
         path = self.folder / "drive.mcap"

@@ -71,7 +71,6 @@ struct Feeds {
     diagnoses: Feed<FaultBelief>,
     actions: Feed<Action>,
     faults: Feed<Faults>,
-    orders: Feed<Control>,
     journals: [Feed<Journal>; 3],
     checkpoints: [Feed<CheckpointPart>; 3],
 }
@@ -86,7 +85,6 @@ impl Feeds {
             diagnoses: Feed::new(graph, Topic::Diagnosis),
             actions: Feed::new(graph, Topic::Action),
             faults: Feed::new(graph, Topic::Faults),
-            orders: Feed::new(graph, Topic::Control(ServiceName::Supervisor)),
             journals: services.map(|service| Feed::new(graph, Topic::Journal(service))),
             checkpoints: services.map(|service| Feed::new(graph, Topic::Checkpoint(service))),
         }
@@ -103,7 +101,6 @@ impl Feeds {
         self.diagnoses.drain(flight);
         self.actions.drain(flight);
         self.faults.drain(flight);
-        self.orders.drain(flight);
         // Recordings have few of them, and a replay needs none.
         self.particles.drain(&mut None);
     }

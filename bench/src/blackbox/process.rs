@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io;
+use std::os::unix::fs::MetadataExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -36,19 +37,35 @@ impl Process {
     /// Starts it, if there is none, and waits until it has its ring and has rescued what an earlier
     /// one kept.
     pub fn start(&mut self) -> io::Result<()> {
-        if self.child.is_none() {
-            self.spawn()?;
+        if self.child.is_some() {
+            return Ok(());
         }
+        // That of a process before this one.
+        let ring_before = self.ring();
+        self.spawn()?;
         let began = Instant::now();
-        let ring = self.domain.ring_file();
-        let left = ring.with_extension("left");
-        while !ring.exists() || left.exists() {
+        while self.ring().is_none_or(|ring| Some(ring) == ring_before) || self.is_unwritten() {
+            let child = self.child.as_mut().map(Child::try_wait).transpose()?;
+            if let Some(status) = child.flatten() {
+                return Err(io::Error::other(format!("the black box ended: {status}")));
+            }
             if began.elapsed() > LIMIT {
                 return Err(io::Error::other("the black box did not come up"));
             }
             std::thread::sleep(POLL);
         }
         Ok(())
+    }
+
+    /// Its ring, by what no other has.
+    fn ring(&self) -> Option<u64> {
+        let ring = fs::metadata(self.domain.memory_folder().join("ring"));
+        ring.ok().map(|ring| ring.ino())
+    }
+
+    fn is_unwritten(&self) -> bool {
+        let mut folders = self.domain.unwritten_folders().into_iter();
+        folders.any(|folder| folder.exists())
     }
 
     /// Starts it, as the launcher does.
@@ -126,7 +143,7 @@ impl Process {
 
     /// Its ring, bytes.
     pub fn ring_bytes(&self) -> u64 {
-        fs::metadata(self.domain.ring_file()).map_or(0, |ring| ring.len())
+        fs::metadata(self.domain.memory_folder().join("ring")).map_or(0, |ring| ring.len())
     }
 
     fn read(&self, file: &str) -> String {

@@ -5,6 +5,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
+use vigil_setup::RunningGraph;
+
 /// How a recording ends that is not finished.
 const PART: &str = ".mcap.part";
 /// How one ends that is.
@@ -23,6 +25,17 @@ pub struct RecordingsFolder {
 }
 
 impl RecordingsFolder {
+    /// That of a graph.
+    ///
+    /// # Errors
+    /// See [`Self::open`].
+    pub fn find(running: &RunningGraph) -> io::Result<Self> {
+        let (setup, graph) = (&running.setup, running.domain.graph());
+        let settings = &setup.file.blackbox;
+        let candidates = settings.folders(&setup.path, graph);
+        Self::open(&candidates, graph, settings.folder_bytes())
+    }
+
     /// The first of these folders in which files can be made.
     ///
     /// # Errors

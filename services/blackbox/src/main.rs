@@ -3,10 +3,13 @@
 
 mod feeds;
 mod folder;
+mod memory;
 mod reason;
 mod record;
 mod recorder;
+mod rescue;
 mod ring;
+mod say;
 mod watch;
 
 use std::error::Error;
@@ -15,7 +18,12 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
-use vigil_setup::{RunningArgs, RunningGraph};
+use vigil_cycle::domain::Queues;
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{Domain, placement};
+use vigil_setup::RunningArgs;
+
+use crate::say::say;
 
 /// Keeps the last seconds of a running graph, and writes them at an alarm, a crash, or on demand.
 ///
@@ -25,8 +33,8 @@ use vigil_setup::{RunningArgs, RunningGraph};
 struct Args {
     #[command(flatten)]
     running: RunningArgs,
-    /// Only write what a black box has kept that was killed.
-    #[arg(long)]
+    /// Only write what black boxes have kept that were killed.
+    #[arg(long, requires = "graph")]
     rescue: bool,
     /// Record into this file from now on, beside the graph's own black box; what lies there is
     /// replaced.
@@ -38,33 +46,38 @@ struct Args {
 }
 
 impl Args {
-    /// Does it; true if that was of any use.
-    fn run(&self, running: RunningGraph) -> Result<bool, Box<dyn Error>> {
+    /// Does it; the code to exit with.
+    fn run(&self) -> Result<u8, Box<dyn Error>> {
+        // What has kept it need not run any more.
+        if let (true, Some(graph)) = (self.rescue, &self.running.graph) {
+            rescue::run(&Domain::new(graph, Queues::default())?);
+            return Ok(0);
+        }
+        let running = match self.running.find() {
+            Ok(running) => running,
+            Err(error) => {
+                say(&format!("the black box: {error}"));
+                return Ok(2);
+            }
+        };
+        let services = ServiceName::ALL.map(|name| running.setup.service(name).core);
+        placement::keep_off(&services);
         match &self.record {
             Some(path) => {
                 let duration = self.duration.map(Duration::try_from_secs_f64);
-                record::run(running, path, duration.transpose()?)
+                let is_something = record::run(running, path, duration.transpose()?)?;
+                Ok(u8::from(!is_something))
             }
-            None if self.rescue => watch::rescue_only(running).map(|()| true),
-            None => watch::run(running).map(|()| true),
+            None => watch::run(running).map(|()| 0),
         }
     }
 }
 
 fn main() -> ExitCode {
-    let args = Args::parse();
-    let running = match args.running.find() {
-        Ok(running) => running,
+    match Args::parse().run() {
+        Ok(code) => ExitCode::from(code),
         Err(error) => {
-            watch::say(&format!("the black box: {error}"));
-            return ExitCode::from(2);
-        }
-    };
-    match args.run(running) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(1),
-        Err(error) => {
-            watch::say(&format!("the black box: {error}"));
+            say(&format!("the black box: {error}"));
             ExitCode::from(1)
         }
     }

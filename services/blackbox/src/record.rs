@@ -18,7 +18,7 @@ use crate::feeds::Feeds;
 use crate::reason::Reason;
 use crate::recorder::{Cause, Destination, Material, Order, Recording, RecordingError, Written};
 use crate::ring::RingWriter;
-use crate::watch;
+use crate::say::say;
 
 /// Largest memory for what the disk has not taken yet, bytes.
 const MEMORY_BYTES: u64 = 32 << 20;
@@ -39,7 +39,6 @@ pub fn run(
     duration: Option<Duration>,
 ) -> Result<bool, Box<dyn Error>> {
     signal::install();
-    watch::keep_off(&running.setup);
     let destination = Destination::File(path.to_owned());
     let material = Arc::new(Material::new(running, destination)?);
     match record(&material, path, duration)?.finish() {
@@ -48,7 +47,7 @@ pub fn run(
             Ok(true)
         }
         Err(nothing @ RecordingError::Nothing) => {
-            watch::say(&nothing.to_string());
+            say(&nothing.to_string());
             Ok(false)
         }
         Err(error) => Err(error.into()),
@@ -76,7 +75,7 @@ fn record(
     }
     drop(progress);
     if is_deserted {
-        watch::say("the graph has ended");
+        say("the graph has ended");
     }
     Ok(recording)
 }
@@ -84,8 +83,7 @@ fn record(
 /// A ring of its own beside that of the graph's black box; it is gone with this process.
 fn ring(running: &RunningGraph) -> io::Result<RingWriter> {
     let id = std::process::id();
-    let path = running.domain.ring_file();
-    let path = path.with_file_name(format!("record-{id}"));
+    let path = running.domain.folder().join(format!("record-{id}"));
     let memory_bytes = running.setup.file.blackbox.memory_bytes();
     let ring = RingWriter::create(&path, memory_bytes.min(MEMORY_BYTES))?;
     fs::remove_file(path)?;

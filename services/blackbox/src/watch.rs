@@ -2,22 +2,22 @@
 
 use std::error::Error;
 use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread;
 
 use vigil_cycle::port::Link;
-use vigil_cycle::topic::ServiceName;
-use vigil_cycle::{Clock, Domain, Graph, Monotonic, placement, signal};
-use vigil_setup::{RunningGraph, Setup};
+use vigil_cycle::{Clock, Domain, Graph, Monotonic, signal};
+use vigil_setup::RunningGraph;
 
 use crate::feeds::{Feeds, News};
 use crate::folder::RecordingsFolder;
+use crate::memory;
 use crate::reason::Reason;
 use crate::recorder::{Cause, Destination, Material, Order, Recording};
-use crate::ring::{RingReader, RingWriter};
+use crate::rescue::{self, Rescue};
+use crate::ring::RingWriter;
+use crate::say::{say, tell};
 
 /// Nanoseconds of a second.
 const NS: f64 = 1e9;
@@ -27,7 +27,10 @@ const AFTER_MAX: u64 = 6;
 /// Keeps and writes until it is asked to stop, or no service is left.
 pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     signal::install();
-    let folder = folder(&running)?;
+    let folder = RecordingsFolder::find(&running)?;
+    for cut in folder.adopt_parts() {
+        say(&format!("{} was cut short", cut.display()));
+    }
     let path = folder.path().as_os_str().as_encoded_bytes();
     fs::write(running.domain.recordings_file(), path)?;
     // Also of a process before this one: each start would write a recording otherwise.
@@ -35,82 +38,16 @@ pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     let miss_ns = since_misses_ns.and_then(|since_ns| Monotonic.now_ns().checked_sub(since_ns));
     let material = Arc::new(Material::new(running, Destination::Folder(folder))?);
     let domain = &material.running.domain;
-    let mut rescue = set_aside(&domain.ring_file()).and_then(|left| Rescue::start(&material, left));
-    let kept = keep(&material, miss_ns, &mut rescue);
+    memory::set_aside(domain);
+    let mut rescues = Rescue::start_all(domain);
+    let kept = keep(&material, miss_ns, &mut rescues);
     // Whatever happened: what was left is written before this process ends.
-    rescue.into_iter().for_each(Rescue::finish);
+    rescues.into_iter().for_each(Rescue::finish);
     kept?;
-    // An orderly end: nothing is left to be rescued.
-    let _ = fs::remove_file(domain.ring_file());
+    // An orderly end: nothing is left to be rescued, but what there was no room for.
+    memory::remove(&domain.memory_folder());
+    rescue::run(domain);
     Ok(())
-}
-
-/// Writes what a black box has kept that was killed with its graph, and nothing else.
-pub fn rescue_only(running: RunningGraph) -> Result<(), Box<dyn Error>> {
-    let folder = folder(&running)?;
-    let material = Arc::new(Material::new(running, Destination::Folder(folder))?);
-    let rescue = Rescue::start(&material, material.running.domain.ring_file());
-    rescue.into_iter().for_each(Rescue::finish);
-    Ok(())
-}
-
-/// Where its recordings lie; keeps off the cores of the services.
-fn folder(running: &RunningGraph) -> io::Result<RecordingsFolder> {
-    let setup = &running.setup;
-    keep_off(setup);
-    let (settings, graph) = (&setup.file.blackbox, running.domain.graph());
-    let candidates = settings.folders(&setup.path, graph);
-    let folder = RecordingsFolder::open(&candidates, graph, settings.folder_bytes())?;
-    for cut in folder.adopt_parts() {
-        say(&format!("{} was cut short", cut.display()));
-    }
-    Ok(folder)
-}
-
-/// Keeps this process off the cores of the services.
-pub fn keep_off(setup: &Setup) {
-    placement::keep_off(&ServiceName::ALL.map(|name| setup.service(name).core));
-}
-
-/// Puts the ring of an earlier process aside; `None` if there is none.
-fn set_aside(ring: &Path) -> Option<PathBuf> {
-    let left = ring.with_extension("left");
-    fs::rename(ring, &left).ok().map(|()| left)
-}
-
-/// What an earlier process has kept, while it is being written.
-struct Rescue {
-    recording: Recording,
-    left: PathBuf,
-}
-
-impl Rescue {
-    /// Begins to write it; what is no ring is removed.
-    fn start(material: &Arc<Material>, left: PathBuf) -> Option<Self> {
-        let Ok(ring) = RingReader::open(&left) else {
-            let _ = fs::remove_file(left);
-            return None;
-        };
-        let now_ns = Monotonic.now_ns();
-        let order = Order {
-            cause: Cause {
-                reason: Reason::Crash,
-                t_ns: now_ns,
-                text: "the black box before this one was killed".to_owned(),
-            },
-            from_ns: 0,
-            until_ns: now_ns,
-            until_ns_max: now_ns,
-        };
-        let recording = Recording::start(material, ring, order);
-        Some(Self { recording, left })
-    }
-
-    /// Waits until it is written, and gives its memory back.
-    fn finish(self) {
-        tell(self.recording);
-        let _ = fs::remove_file(self.left);
-    }
 }
 
 /// Keeps the last seconds, and writes them when there is a reason. Missed cycles were last one at
@@ -118,11 +55,11 @@ impl Rescue {
 fn keep(
     material: &Arc<Material>,
     miss_ns: Option<u64>,
-    rescue: &mut Option<Rescue>,
+    rescues: &mut Vec<Rescue>,
 ) -> Result<(), Box<dyn Error>> {
     let (domain, setup) = (&material.running.domain, &material.running.setup);
     let settings = &setup.file.blackbox;
-    let ring = RingWriter::create(&domain.ring_file(), settings.memory_bytes())?;
+    let ring = memory::create(&material.running)?;
     let mut feeds = Feeds::open(&Graph::SharedMemory(Link::join(domain, "blackbox")?))?;
     let mut blackbox = Blackbox {
         before_ns: (settings.before_s * NS) as u64,
@@ -142,10 +79,11 @@ fn keep(
             thread::sleep(pause);
         }
         blackbox.look(&mut feeds)?;
-        let is_over = |rescue: &mut Rescue| rescue.recording.is_over();
-        rescue.take_if(is_over).into_iter().for_each(Rescue::finish);
+        let over = rescues.extract_if(.., |rescue| rescue.is_over());
+        over.for_each(Rescue::finish);
     }
-    blackbox.recordings.into_iter().for_each(tell);
+    let last = blackbox.recordings.into_iter();
+    last.map(Recording::finish).for_each(tell);
     Ok(())
 }
 
@@ -169,12 +107,8 @@ impl Blackbox {
         let mut news = Vec::new();
         feeds.drain(&mut self.ring, &mut news)?;
         self.material.lost.store(feeds.lost(), Ordering::Relaxed);
-        let (over, going) = std::mem::take(&mut self.recordings)
-            .into_iter()
-            .partition(Recording::is_over);
-        self.recordings = going;
-        let over: Vec<Recording> = over;
-        over.into_iter().for_each(tell);
+        let over = self.recordings.extract_if(.., |of| of.is_over());
+        over.map(Recording::finish).for_each(tell);
         for (reason, text) in news.iter().filter_map(reason) {
             if reason != Reason::Miss || feeds.has_frames() {
                 self.note(reason, text);
@@ -236,18 +170,4 @@ fn reason(news: &News) -> Option<(Reason, String)> {
         News::Event(..) => format!("{reason}, says {name}"),
     };
     Some((reason, text))
-}
-
-/// Waits until a recording is finished, and says where it lies.
-fn tell(recording: Recording) {
-    match recording.finish() {
-        Ok(written) => say(&format!("recorded {}", written.path.display())),
-        Err(error) => say(&format!("no recording: {error}")),
-    }
-}
-
-/// Says it; that nobody reads it is no reason to end.
-pub fn say(text: &str) {
-    use std::io::Write;
-    let _ = writeln!(std::io::stderr(), "vigil: {text}");
 }

@@ -125,10 +125,11 @@ impl Companion {
     }
 }
 
-/// Has a black box that was killed with its whole graph leave a recording, before its memory and
-/// the graph's files are gone.
+/// Has what was kept by black boxes that were killed written, before the files are gone that say
+/// what happened then.
 pub fn rescue(plan: &Plan, domain: &Domain) {
-    if !domain.ring_file().exists() {
+    let mut memories = domain.unwritten_folders().into_iter();
+    if !domain.memory_folder().exists() && !memories.any(|folder| folder.exists()) {
         return;
     }
     let command = CommandLine {

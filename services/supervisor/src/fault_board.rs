@@ -152,11 +152,12 @@ impl FaultBoard {
             let Some(control) = self.orders.take_next() else {
                 break;
             };
-            let (id, command) = (control.header.id(), control.command);
+            let (id, command, fault) = (control.header.id(), control.command, control.fault);
             let is_ours = control.header.schema == Control::SCHEMA;
-            let is_done = is_ours && step.obey(control, now_ns);
+            let is_done = is_ours && step.obey(command, fault, now_ns);
             if is_ours {
-                let entry = JournalEntry::new(JournalKind::Ordered, 1);
+                // The entry says it all: who sent the block is gone before a recording sees it.
+                let entry = JournalEntry::new(JournalKind::Ordered, command).about(fault);
                 journal.note(entry.with_input(id).at(now_ns));
             }
             health.answer_control(id.epoch, id.seq, is_done);

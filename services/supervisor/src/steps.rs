@@ -1,8 +1,7 @@
 //! What the supervisor computes: actions, and the life of faults.
 
 use vigil_blocks::{
-    Action, Control, ControlCommand, Entry, FaultBelief, FaultRecord, Faults, Readiness,
-    SensorFrame,
+    Action, ControlCommand, Entry, FaultBelief, FaultRecord, Faults, Readiness, SensorFrame,
 };
 use vigil_checkpoint::Checkpoint;
 use vigil_decision::{CycleDecision, FaultLife, Inputs, LifeInput, LifeOrder, Supervisor};
@@ -96,13 +95,12 @@ impl FaultStep {
         });
     }
 
-    /// Carries out an operator's order; false if it is none about faults, or finds nothing to do.
-    pub fn obey(&mut self, control: &Control, now_ns: u64) -> bool {
-        let is = |command: ControlCommand| control.command == command as u32;
+    /// Carries out an operator's order, a [`ControlCommand`] and the number of a fault; false if it
+    /// is none about faults, or finds nothing to do.
+    pub fn obey(&mut self, command: u32, fault: u32, now_ns: u64) -> bool {
+        let is = |wanted: ControlCommand| command == wanted as u32;
         let order = match () {
-            () if is(ControlCommand::Acknowledge) => {
-                LifeOrder::Acknowledge(u64::from(control.fault))
-            }
+            () if is(ControlCommand::Acknowledge) => LifeOrder::Acknowledge(u64::from(fault)),
             () if is(ControlCommand::Forget) => LifeOrder::Clear,
             () => return false,
         };

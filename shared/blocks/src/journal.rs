@@ -60,7 +60,8 @@ pub enum JournalKind {
     /// The faults have lived until `t_ns`; `count` says as bits, in the order of the data, which
     /// services were silent.
     Lived = 10,
-    /// An operator's order about faults was taken at `t_ns`.
+    /// An operator's order about faults was taken at `t_ns`: `count` is its
+    /// [`ControlCommand`](crate::ControlCommand), `fault` what it asks about.
     Ordered = 11,
     /// The faults were published; `input` names the block.
     Told = 12,
@@ -73,7 +74,7 @@ pub struct JournalEntry, size 56 {
     /// A [`JournalKind`].
     pub kind: u32,
     /// Periods that were missed, particles that are allowed, frames that were refused, services
-    /// that were silent.
+    /// that were silent, the command of an order.
     pub count: u32,
     /// The input: a sensor frame; for the supervisor a diagnosis, or what the kind says. Epoch 0
     /// stands for none.
@@ -88,8 +89,8 @@ pub struct JournalEntry, size 56 {
     pub t_ns: u64,
     /// The blindness that the detection was taken with, which a later prediction may have said.
     pub blind: u32,
-    /// Reserved, zero.
-    pub reserved: u32,
+    /// The fault that an order is about, by its number; 0 for all.
+    pub fault: u32,
 }
 }
 
@@ -115,6 +116,13 @@ impl JournalEntry {
     #[must_use]
     pub const fn at(mut self, t_ns: u64) -> Self {
         self.t_ns = t_ns;
+        self
+    }
+
+    /// The same entry about this fault.
+    #[must_use]
+    pub const fn about(mut self, fault: u32) -> Self {
+        self.fault = fault;
         self
     }
 

@@ -162,10 +162,16 @@ impl Domain {
         self.folder.join("events")
     }
 
-    /// File in which the black box keeps the last seconds.
+    /// Folder in which the black box keeps the last seconds.
     #[must_use]
-    pub fn ring_file(&self) -> PathBuf {
-        self.folder.join("ring")
+    pub fn memory_folder(&self) -> PathBuf {
+        self.folder.join("memory")
+    }
+
+    /// Folders of black boxes that were killed; each stays until what they kept is written.
+    #[must_use]
+    pub fn unwritten_folders(&self) -> [PathBuf; 2] {
+        ["unwritten-1", "unwritten-2"].map(|name| self.folder.join(name))
     }
 
     /// What a request to the black box begins with that is about a crash.
@@ -308,7 +314,8 @@ impl Domain {
         found
     }
 
-    /// Removes every file of this graph. Only for the holder of the lock, with no service alive.
+    /// Removes every file of this graph but the memory of its black box, which goes when it is
+    /// written. Only for the holder of the lock, with no service alive.
     pub fn remove_residue(&self) {
         for path in self.residue() {
             let _ = fs::remove_file(path);
@@ -325,7 +332,6 @@ impl Domain {
             self.options_file(),
             self.request_file(),
             self.recordings_file(),
-            self.ring_file(),
         ] {
             let _ = fs::remove_file(file);
         }

@@ -1,5 +1,7 @@
 //! Graphs that run on this machine, and what they run on.
 
+use std::path::Path;
+
 use vigil_cycle::{Domain, PortError, Processes};
 
 use crate::document::Document;
@@ -94,11 +96,19 @@ impl RunningGraph {
             running: Domain::all_running(),
         };
         let domain = Domain::running(name).ok_or_else(unknown)?;
+        Self::read_document(name, &domain.document_file())
+    }
+
+    /// A graph of this name that runs, or has run, on the document in this file.
+    ///
+    /// # Errors
+    /// [`NotRunning::Document`], and the transport's.
+    pub fn read_document(name: &str, file: &Path) -> Result<Self, NotRunning> {
         let refused = |error| NotRunning::Document {
             name: name.to_owned(),
             error,
         };
-        let document = Document::read_text(&domain.document_file()).map_err(refused)?;
+        let document = Document::read_text(file).map_err(refused)?;
         let setup = document.check().map_err(refused)?;
         Ok(Self {
             // With the queues of its configuration.

@@ -4,11 +4,10 @@ use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, VecDeque};
 
 use vigil_blocks::{
-    Action, Block, BlockId, Control, DetectionBelief, FaultBelief, Faults, HealthyBelief,
-    ParticleBlock, SensorFrame, WeightedHypothesis,
+    Action, Block, BlockId, DetectionBelief, FaultBelief, Faults, HealthyBelief, ParticleBlock,
+    SensorFrame, WeightedHypothesis,
 };
 use vigil_cycle::Topic;
-use vigil_cycle::topic::ServiceName;
 use vigil_flight::read_block;
 
 /// Blocks of one topic.
@@ -86,8 +85,6 @@ pub(crate) struct Blocks {
     pub(crate) diagnoses: Window<FaultBelief>,
     pub(crate) actions: Window<Action>,
     pub(crate) faults: Window<Faults>,
-    /// Operators' orders to the supervisor.
-    pub(crate) orders: Window<Control>,
     /// Computed again.
     pub(crate) hypotheses: Window<Hypotheses>,
 }
@@ -101,7 +98,6 @@ impl Blocks {
             diagnoses: Window::new(kept_ns),
             actions: Window::new(kept_ns),
             faults: Window::new(kept_ns),
-            orders: Window::new(kept_ns),
             hypotheses: Window::new(kept_ns),
         }
     }
@@ -113,7 +109,6 @@ impl Blocks {
         self.diagnoses.begin(now_ns);
         self.actions.begin(now_ns);
         self.faults.begin(now_ns);
-        self.orders.begin(now_ns);
     }
 
     /// Keeps a recorded block, if a step may need it; false if it cannot be read.
@@ -124,7 +119,6 @@ impl Blocks {
             Topic::Diagnosis => insert(&mut self.diagnoses, now_ns, bytes),
             Topic::Action => insert(&mut self.actions, now_ns, bytes),
             Topic::Faults => insert(&mut self.faults, now_ns, bytes),
-            Topic::Control(ServiceName::Supervisor) => insert(&mut self.orders, now_ns, bytes),
             _ => true,
         }
     }

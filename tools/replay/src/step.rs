@@ -36,7 +36,6 @@ pub(crate) enum Missing {
     Hypotheses,
     Diagnosis,
     Faults,
-    Order,
     Version,
 }
 
@@ -48,7 +47,6 @@ impl Missing {
             Self::Hypotheses => "the detector's hypotheses are not known",
             Self::Diagnosis => "a diagnosis was not recorded",
             Self::Faults => "the faults that an earlier supervisor has left were not recorded",
-            Self::Order => "an operator's order was not recorded",
             Self::Version => "the journal is of another version",
         }
     }
@@ -250,8 +248,7 @@ fn live(
         }
         Lived => step.live(entry.t_ns, entry.count),
         Ordered => {
-            let order = entry.input().and_then(|id| blocks.orders.get(id));
-            step.obey(order.ok_or(Missing::Order)?, entry.t_ns);
+            step.obey(entry.count, entry.fault, entry.t_ns);
         }
         Told => step.write(faults),
         _ => {}

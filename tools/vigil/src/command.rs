@@ -10,12 +10,7 @@ use vigil_terminal::CommandError;
 /// Time that a service may take to answer.
 const ANSWER_LIMIT: Duration = Duration::from_secs(2);
 
-/// Time that an order stays to be seen, once it is answered: observers look every 50 ms, and find
-/// only a sender that is still there.
-const SEEN: Duration = Duration::from_millis(150);
-
 /// Sends the filled block; whether the service has done it, or `None` if it does not answer.
-/// Recordings hold it, too.
 ///
 /// # Errors
 /// The transport's.
@@ -31,9 +26,7 @@ pub fn send(
     sender
         .send(Stamp::default(), &Monotonic)
         .map_err(CommandError::failure)?;
-    let answered = answer(health.as_mut(), epoch, seq);
-    std::thread::sleep(SEEN);
-    Ok(answered)
+    Ok(answer(health.as_mut(), epoch, seq))
 }
 
 /// Waits for the answer to command (epoch, seq).
