@@ -162,7 +162,7 @@ class Record(unittest.TestCase):
 
 class CheckPublisher(unittest.TestCase):
     def check(self, graph, *options):
-        done = vigil("check-publisher", "--graph", graph, "--seconds", "3", "--json", *options)
+        done = vigil("check-publisher", "--graph", graph, "--duration", "3", "--json", *options)
         document = json.loads(done.stdout)
         self.assertEqual(done.returncode, 0 if document["ok"] else 1)
         return document

@@ -42,7 +42,7 @@ class OfGraphs(Documents):
         self.document("config", "--rate", "50")
         self.document("list")
         listen = ["--graph", "py-schemas", "--source", "external"]
-        self.document("check-publisher", *listen, "--seconds", "0.3")
+        self.document("check-publisher", *listen, "--duration", "0.3")
         self.document("record", *listen, "--duration", "0.3", "--out", self.folder() / "frames.csv")
 
     def test_what_is_printed_of_a_running_graph_and_at_its_end(self):

@@ -7,6 +7,8 @@ use super::half::{Half, State};
 use crate::interval::bootstrap;
 use crate::quantile;
 
+/// Largest ratio of a percentile with a black box to that without one.
+const RATIO_MAX: f64 = 1.05;
 /// Bytes of a MiB.
 const MIB: f64 = (1 << 20) as f64;
 
@@ -25,24 +27,32 @@ impl Run {
         quantile(&mut self.all(state, figure), 0.5)
     }
 
+    /// What a state's halves have more than those of the same rounds without a black box: the
+    /// mean over the rounds, and the ends of its interval.
+    fn more(&self, state: State, figure: impl Fn(&Half) -> f64) -> [f64; 3] {
+        let differences = self.halves_in(state).filter_map(|half| {
+            let mut offs = self.halves_in(State::Off);
+            let off = offs.find(|off| off.span.round == half.span.round)?;
+            Some(figure(half) - figure(off)).filter(|difference| difference.is_finite())
+        });
+        bootstrap(&differences.collect::<Vec<_>>())
+    }
+
     /// Geometric mean over the rounds of a percentile over that of the same round without a black
     /// box, and the ends of its interval.
     fn ratio(&self, state: State, percentile: usize) -> [f64; 3] {
-        let mut logs = Vec::new();
-        for half in self.halves_in(state) {
-            let off = self
-                .halves_in(State::Off)
-                .find(|off| off.span.round == half.span.round);
-            let off =
-                off.map(|off| (half.latency_us[percentile] / off.latency_us[percentile]).ln());
-            logs.extend(off.filter(|log| log.is_finite()));
-        }
-        bootstrap(&logs).map(f64::exp)
+        let logs = self.more(state, |half| half.latency_us[percentile].ln());
+        logs.map(f64::exp)
     }
 
     /// Own misses in 100,000 cycles.
     fn misses(&self, state: State) -> [f64; 3] {
         bootstrap(&self.all(state, Half::own_per_100_000))
+    }
+
+    /// Own misses in 100,000 cycles more than in the same round without a black box.
+    fn misses_more(&self, state: State) -> [f64; 3] {
+        self.more(state, Half::own_per_100_000)
     }
 
     /// Share of a core that the black box takes, %.
@@ -62,6 +72,7 @@ pub fn document(plan: &Plan, run: &Run) -> Value {
             "p50_over_off": bounded(run.ratio(state, 0)),
             "p99_over_off": bounded(run.ratio(state, 1)),
             "own_misses_per_100_000": bounded(run.misses(state)),
+            "own_misses_per_100_000_more": bounded(run.misses_more(state)),
             "cycles": run.halves_in(state).map(|half| half.cycles).sum::<u64>(),
             "own_misses": run.halves_in(state).map(|half| half.own_misses).sum::<u64>(),
             "other_misses": run.halves_in(state).map(|half| half.other_misses).sum::<u64>(),
@@ -83,23 +94,24 @@ pub fn document(plan: &Plan, run: &Run) -> Value {
 #[must_use]
 pub fn table(run: &Run) -> Vec<String> {
     let mut lines = vec![
-        "| black box | p50, us | over off | p99, us | over off | own misses in 100,000 | of others \
-         | memory, MiB | ring, MiB | of a core, % |"
+        "| black box | p50, us | over off | p99, us | over off | own misses in 100,000 | more than off \
+         | of others | memory, MiB | ring, MiB | of a core, % |"
             .to_owned(),
-        "|---|---|---|---|---|---|---|---|---|---|".to_owned(),
+        "|---|---|---|---|---|---|---|---|---|---|---|".to_owned(),
     ];
     let bounded = |decimals: usize, [mean, low, high]: [f64; 3]| {
         format!("{mean:.decimals$} [{low:.decimals$}, {high:.decimals$}]")
     };
     lines.extend(State::ALL.map(|state| {
         format!(
-            "| {} | {:.1} | {} | {:.1} | {} | {} | {} | {:.1} | {:.0} | {} |",
+            "| {} | {:.1} | {} | {:.1} | {} | {} | {} | {} | {:.1} | {:.0} | {} |",
             state.name(),
             run.median(state, |half| half.latency_us[0]),
             bounded(3, run.ratio(state, 0)),
             run.median(state, |half| half.latency_us[1]),
             bounded(3, run.ratio(state, 1)),
             bounded(1, run.misses(state)),
+            bounded(1, run.misses_more(state)),
             run.halves_in(state)
                 .map(|half| half.other_misses)
                 .sum::<u64>(),
@@ -108,5 +120,29 @@ pub fn table(run: &Run) -> Vec<String> {
             bounded(1, run.cpu_percent(state)),
         )
     }));
+    lines.extend([String::new(), verdict(run)]);
     lines
+}
+
+/// Whether a black box costs no more than it may.
+fn verdict(run: &Run) -> String {
+    let [p50, p99] = [0, 1].map(|percentile| run.ratio(State::On, percentile));
+    format!(
+        "With a black box: p50 at most {RATIO_MAX} times that without: {}; p99: {}; no further own \
+         misses: {}.",
+        judge(p50, RATIO_MAX),
+        judge(p99, RATIO_MAX),
+        judge(run.misses_more(State::On), 0.0),
+    )
+}
+
+/// Whether a figure with this interval is at most `bar`.
+fn judge([_, low, high]: [f64; 3], bar: f64) -> &'static str {
+    if high <= bar {
+        "met"
+    } else if low > bar {
+        "missed"
+    } else {
+        "not decided by so many rounds"
+    }
 }

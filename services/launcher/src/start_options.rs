@@ -32,9 +32,11 @@ impl StartOptions {
         })
     }
 
-    /// Leaves them in a file.
+    /// Leaves them in a file, all of them or none.
     pub fn leave(&self, file: &Path) -> io::Result<()> {
-        std::fs::write(file, serde_json::to_vec(self)?)
+        let part = file.with_extension("part");
+        std::fs::write(&part, serde_json::to_vec(self)?)?;
+        std::fs::rename(part, file)
     }
 
     /// Those that another launcher has left.

@@ -19,8 +19,13 @@ pub struct Args {
     #[command(flatten)]
     graph: GraphArgs,
     /// Time to listen, s.
-    #[arg(long, value_name = "S", default_value_t = 5.0)]
-    seconds: f64,
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 5.0,
+        visible_alias = "seconds"
+    )]
+    duration: f64,
     /// Print one JSON document.
     #[arg(long)]
     json: bool,
@@ -66,16 +71,16 @@ fn end(found: &[Finding]) -> String {
 /// A configuration that is refused; a transport that cannot be opened for another reason than a
 /// publisher's types.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    if !(0.1..=3600.0).contains(&args.seconds) {
-        let message = format!("--seconds {}: allowed is 0.1 to 3600", args.seconds);
+    if !(0.1..=3600.0).contains(&args.duration) {
+        let message = format!("--duration {}: allowed is 0.1 to 3600", args.duration);
         return Err(CommandError::usage(message));
     }
     let mut border = args.graph.border().map_err(CommandError::usage)?;
     border.file.sensor.source = publisher::source(&border).map_err(CommandError::failure)?;
     if !args.json {
-        eprintln!("listening for {} s", args.seconds);
+        eprintln!("listening for {} s", args.duration);
     }
-    let (heard, unheard) = publisher::listen(&border, args.seconds, &mut |heard, arrival, _| {
+    let (heard, unheard) = publisher::listen(&border, args.duration, &mut |heard, arrival, _| {
         heard.keep(arrival);
     })
     .map_err(CommandError::failure)?;
