@@ -4,7 +4,7 @@ use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
 use vigil_setup::GraphArgs;
 
-use crate::harness::{Summary, binary, machine, root, unique};
+use crate::harness::{Summary, binary, root, shared_machine, unique};
 
 /// What the assertion that fails on purpose leaves in the timeline: text and place.
 const TEXT: &str = "an assertion fails because a test wants it (shared/cycle/src/live.rs:";
@@ -35,7 +35,7 @@ fn fail(service: ServiceName, options: &[&str]) -> String {
 
 #[test]
 fn an_assertion_that_fails_twice_ends_the_graph_whichever_service_it_is() {
-    let _machine = machine();
+    let _machine = shared_machine();
     for service in ServiceName::ALL {
         let name = service.as_str();
         let json = serde_json::from_str(&fail(service, &["--json"])).unwrap();
@@ -62,7 +62,7 @@ fn an_assertion_that_fails_twice_ends_the_graph_whichever_service_it_is() {
 
 #[test]
 fn the_robot_stops_when_the_supervisors_assertion_fails() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let summary = Summary {
         json: serde_json::from_str(&fail(ServiceName::Supervisor, &["--json"])).unwrap(),
     };
@@ -76,7 +76,7 @@ fn the_robot_stops_when_the_supervisors_assertion_fails() {
 
 #[test]
 fn people_read_the_assertion_in_the_timeline_too() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let text = fail(ServiceName::Detector, &[]);
     let told = |line: &str| line.contains("detector    assertion") && line.contains(TEXT);
     assert_eq!(text.lines().filter(|line| told(line)).count(), 2, "{text}");

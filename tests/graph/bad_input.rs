@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 
 use flate2::bufread::GzDecoder;
 
-use crate::harness::{RunningGraph, binary, eventually, launch, machine, root, unique};
+use crate::harness::{RunningGraph, binary, eventually, launch, root, shared_machine, unique};
 
 /// A copy of `config/` in which one text is replaced.
 fn changed(folder: &Path, file: &str, from: &str, to: &str) {
@@ -206,7 +206,7 @@ fn bad_options_and_recordings_are_refused() {
 
 #[test]
 fn a_second_graph_of_the_same_name_is_refused_and_the_first_goes_on() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let mut first = RunningGraph::start("twice", &["--duration", "30"]);
     let observed = first.observe();
     let mut health = crate::harness::HealthWatch::new(&observed);

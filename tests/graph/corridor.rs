@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::harness::{RunningGraph, Summary, binary, machine};
+use crate::harness::{RunningGraph, Summary, binary, shared_machine};
 
 /// Decisions, symptoms, outcomes and the goal, in order, from the first decision on.
 fn story(summary: &Summary) -> Vec<String> {
@@ -26,7 +26,7 @@ fn assert_fired(summary: &Summary, first: &str) {
 
 #[test]
 fn a_blocked_corridor_is_tried_and_gone_round_live() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let config = "config/corridor-obstacle.toml".into();
     let summary = RunningGraph::start_with(config, "obstacle", &["--duration", "40"]).finish();
     let told = story(&summary);
@@ -106,7 +106,7 @@ fn assert_makes_a_mission(summary: &Summary) {
 
 #[test]
 fn people_in_a_corridor_are_waited_for_and_passed_live() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let config = "config/corridor-people.toml".into();
     let summary = RunningGraph::start_with(config, "people", &["--duration", "40"]).finish();
     let told = story(&summary);

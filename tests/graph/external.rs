@@ -7,11 +7,11 @@ use vigil_cycle::clock::sleep_until;
 use vigil_cycle::{Clock, Monotonic, Stamp, Topic};
 use vigil_recording::frames;
 
-use crate::harness::{RunningGraph, config_with, launch, machine, root, unique};
+use crate::harness::{RunningGraph, config_with, launch, root, shared_machine, unique};
 
 #[test]
 fn an_external_publisher_drives_the_graph() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let folder = std::env::temp_dir().join(unique("external"));
     let path = config_with(&folder, |text| {
         text.replace("\"simulator\"", "\"external\"")

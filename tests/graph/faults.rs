@@ -4,7 +4,9 @@ use serde_json::Value;
 use vigil_blocks::Faults;
 use vigil_cycle::{Graph, Receiver, Topic};
 
-use crate::harness::{HealthWatch, RunningGraph, binary, drain, eventually, machine, unique};
+use crate::harness::{
+    HealthWatch, RunningGraph, binary, drain, eventually, shared_machine, unique,
+};
 
 /// What `vigil` answers: exit code, standard output, standard error.
 fn vigil(graph: &str, words: &[&str]) -> (i32, String, String) {
@@ -40,7 +42,7 @@ fn until(graph: &str, state: &str) -> Value {
 
 #[test]
 fn a_fault_lives_from_its_onset_until_it_is_cleared_and_outlives_the_supervisor() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let name = unique("faults");
     let options = ["--inject", "stuck:RM@2", "--inject", "clear:all@14"];
     let mut graph = RunningGraph::start("faults", &options);

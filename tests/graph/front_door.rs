@@ -6,7 +6,7 @@ use serde_json::Value;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Domain, signal};
 
-use crate::harness::{RunningGraph, binary, eventually, machine, root, unique, wait};
+use crate::harness::{RunningGraph, binary, eventually, root, shared_machine, unique, wait};
 use crate::killing::kill;
 
 fn vigil(words: &[&str]) -> Output {
@@ -99,7 +99,7 @@ fn a_graph_that_hears_no_publisher_says_so_and_ends_with_1() {
 
 #[test]
 fn a_graph_whose_launcher_was_killed_is_listed_adopted_and_goes_on() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let name = unique("adopted");
     let inject = ["--inject", "encoder:LF:zero@1", "--inject", "stuck:RM@500"];
     let graph = orphan(&name, &inject);
@@ -159,7 +159,7 @@ fn a_graph_whose_launcher_was_killed_is_listed_adopted_and_goes_on() {
 
 #[test]
 fn a_graph_whose_launcher_was_killed_is_stopped_and_leaves_nothing() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let name = unique("orphan");
     let graph = orphan(&name, &[]);
     let stopped = vigil(&["stop", "--graph", &name]);
@@ -178,7 +178,7 @@ fn a_graph_whose_launcher_was_killed_is_stopped_and_leaves_nothing() {
 
 #[test]
 fn events_are_followed_until_the_graph_ends() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let name = unique("events");
     let mut graph = RunningGraph::start("events", &["--inject", "stuck:RM@2"]);
     graph.observe();

@@ -1,6 +1,6 @@
 //! The main job: a wheel sticks, the graph says so and acts.
 
-use crate::harness::{RunningGraph, Summary, binary, eventually, machine, root};
+use crate::harness::{RunningGraph, Summary, binary, eventually, machine, root, shared_machine};
 
 /// What must hold when RM sticks in a running graph.
 fn assert_told_and_obeyed(summary: &Summary) {
@@ -37,7 +37,7 @@ fn assert_told_and_obeyed(summary: &Summary) {
 
 #[test]
 fn a_stuck_wheel_is_detected_named_and_acted_upon() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let graph = RunningGraph::start("stuck", &["--duration", "9", "--inject", "stuck:RM@3"]);
     let summary = graph.finish();
     assert_told_and_obeyed(&summary);
@@ -70,7 +70,7 @@ fn a_stuck_wheel_is_named_at_1_khz_too() {
 
 #[test]
 fn with_every_channel_a_servo_that_slips_is_named_with_its_angle() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let config = root().join("config/rover-all.toml");
     let options = ["--duration", "9", "--inject", "steer-jump:RF:0.2@3"];
     let summary = RunningGraph::start_with(config, "servo", &options).finish();
@@ -95,7 +95,7 @@ fn without_a_fault_nothing_is_said() {
 
 #[test]
 fn a_fault_injected_at_run_time_is_named_and_its_end_is_seen() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let mut graph = RunningGraph::start("inject", &["--duration", "40"]);
     let name = graph.setup.file.graph.name.clone();
     let observed = graph.observe();

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use vigil_blocks::{RecoveryKind, SensorFrame, Truth};
 use vigil_cycle::{Graph, Receiver, Topic};
 
-use crate::harness::{RunningGraph, drain, eventually, machine};
+use crate::harness::{RunningGraph, drain, eventually, shared_machine};
 
 /// A pose is measured within so much, m and rad: many standard deviations of its noise.
 const NEAR: f64 = 0.1;
@@ -42,7 +42,7 @@ impl Watch {
 
 #[test]
 fn the_truth_of_each_frame_is_told_beside_it() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let mut graph = RunningGraph::start("truth", &["--inject", "stuck:RM@1"]);
     let mut watch = Watch::new(&graph.observe());
     eventually("the wheel sticks", || {
@@ -94,7 +94,7 @@ fn the_truth_of_each_frame_is_told_beside_it() {
 
 #[test]
 fn the_truth_says_when_a_corridor_is_driven_to_its_end() {
-    let _machine = machine();
+    let _machine = shared_machine();
     let config = "config/corridor-people.toml".into();
     let mut graph = RunningGraph::start_with(config, "truth-goal", &[]);
     let mut watch = Watch::new(&graph.observe());

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import tempfile
 import time
+import tomllib
 import unittest
 
 from harness import BINARIES, WATCHDOG_S, Graph, events, vigil, wait_for
@@ -185,7 +186,7 @@ class BlackBox(unittest.TestCase):
             wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
             command = [BINARIES / "vigil", "record", path, "--graph", graph.name, "--duration", "25"]
             with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as recorder:
-                # The order is computed again, too, though nobody has recorded its block.
+                # The order is computed again, too, whether or not its block was recorded.
                 state = lambda: self.states(graph).get("RM_STUCK")
                 wait_for(lambda: state() == "active", "the fault")
                 said = vigil("ack", "RM_STUCK", "--graph", graph.name)
@@ -263,7 +264,10 @@ class BlackBox(unittest.TestCase):
             self.assertEqual(unwritten(), [])
         first, second = map(Flight, self.recordings("crash"))
         for flight in [first, second]:
-            self.assertIn(b"rate_hz = 100", flight.attachments["document.toml"])
+            document = tomllib.loads(flight.attachments["document.toml"].decode())
+            self.assertEqual(document["file"]["graph"]["rate_hz"], 100)
+            told = [message.msg for _, message in flight.messages["/vigil/events"]]
+            self.assertEqual(sum("armed" in text for text in told), 1, told)
             self.assertGreater(len(flight.raw["/vigil/raw/sensor"]), 50)
 
     def test_a_recording_ends_with_a_signal_or_its_graph(self):

@@ -297,11 +297,11 @@ fn supervisor(setup: &Setup, graph: &Graph, kept: &Path, clock: &VirtualClock) -
     SupervisorStage::new(steps, graph, validity_ns, Some(kept), clock).unwrap()
 }
 
-/// An operator acknowledges all faults.
-fn acknowledge(graph: &Graph, clock: &VirtualClock, t_ns: u64) {
+/// An operator orders something of all faults.
+fn order(graph: &Graph, clock: &VirtualClock, command: ControlCommand, t_ns: u64) {
     let topic = Topic::Control(ServiceName::Supervisor);
     let mut orders = graph.sender::<Control>(topic).unwrap();
-    orders.block().command = ControlCommand::Acknowledge as u32;
+    orders.block().command = command as u32;
     let stamp = Stamp {
         t_schedule_ns: t_ns,
         t_capture_ns: t_ns,
@@ -341,7 +341,7 @@ pub fn record(drive: &Drive, path: &Path) {
             Hiccup::SupervisorRestarted => {
                 stages.restart_supervisor(&setup, &graph, &kept, &clock);
             }
-            Hiccup::Acknowledged => acknowledge(&graph, &clock, t_ns),
+            Hiccup::Ordered(command) => order(&graph, &clock, command, t_ns),
             _ => {}
         }
         if !matches!(hiccup, Hiccup::Silent | Hiccup::Refused) {
@@ -378,8 +378,8 @@ pub enum Hiccup {
     Restarted,
     /// The supervisor is a new process.
     SupervisorRestarted,
-    /// An operator knows of all faults.
-    Acknowledged,
+    /// An operator orders this of all faults.
+    Ordered(ControlCommand),
 }
 
 /// What may happen at any time.

@@ -6,7 +6,7 @@ mod graph;
 
 use std::path::Path;
 
-use vigil_blocks::{FaultBelief, FaultRecord, FaultState, Faults};
+use vigil_blocks::{ControlCommand, FaultBelief, FaultRecord, FaultState, Faults};
 use vigil_cycle::Topic;
 use vigil_cycle::topic::ServiceName;
 use vigil_flight::{FlightReader, FlightWriter, Recorded};
@@ -253,7 +253,8 @@ fn restarts_a_new_publisher_and_blindness_are_computed_again() {
         1300 | 1900 => Hiccup::Renewed,
         1600 => Hiccup::Restarted,
         2000 => Hiccup::SupervisorRestarted,
-        2300 => Hiccup::Acknowledged,
+        2300 => Hiccup::Ordered(ControlCommand::Acknowledge),
+        2500 => Hiccup::Ordered(ControlCommand::Forget),
         _ => now_and_then(k),
     };
     for config in ["rover.toml", "kobuki.toml"] {

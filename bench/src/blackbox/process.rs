@@ -159,5 +159,9 @@ impl Drop for Process {
     fn drop(&mut self) {
         // A held one hears nothing else.
         let _ = self.kill();
+        let kept = [self.domain.memory_folder()].into_iter();
+        for folder in kept.chain(self.domain.unwritten_folders()) {
+            let _ = fs::remove_dir_all(folder);
+        }
     }
 }

@@ -61,7 +61,8 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
          from round to round. From the schedule to the action, by the services' own stamps: the \
          median over the rounds, and the geometric mean of the ratios within rounds. Brackets: \
          95 %, by a bootstrap over the rounds. Own: past the deadline, although the frame was in \
-         time. The first second after an orderly start or end of the black box is left out; what \
+         time; more than off: the differences within rounds. The first second after an \
+         orderly start or end of the black box is left out; what \
          follows a signal counts from its instant.\n",
         args.rate
     ));

@@ -48,9 +48,9 @@ struct Args {
 impl Args {
     /// Does it; the code to exit with.
     fn run(&self) -> Result<u8, Box<dyn Error>> {
-        // What has kept it need not run any more.
+        // The graph need not run any more.
         if let (true, Some(graph)) = (self.rescue, &self.running.graph) {
-            rescue::run(&Domain::new(graph, Queues::default())?);
+            rescue::run(&Domain::new(graph, Queues::default())?)?;
             return Ok(0);
         }
         let running = match self.running.find() {

@@ -1,30 +1,72 @@
 //! What a black box keeps in the runtime folder: the last seconds, and what the graph runs on, so
 //! that whoever finds it after a kill can write it.
 
+use std::error::Error;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use vigil_cycle::Domain;
-use vigil_setup::{NotRunning, RunningGraph};
+use vigil_setup::RunningGraph;
+use vigil_timeline::{EventReader, EventWriter};
 
 use crate::ring::{RingReader, RingWriter};
 
 const RING: &str = "ring";
 const DOCUMENT: &str = "document";
+const EVENTS: &str = "events";
 
-/// Begins to keep; what a process before this one has kept is gone.
+/// What a black box has kept that was killed.
+pub struct Memory {
+    /// The last seconds.
+    pub ring: RingReader,
+    /// When it was last written to.
+    pub until: SystemTime,
+    /// The graph that it is of.
+    pub graph: RunningGraph,
+    /// The events until then.
+    pub events: PathBuf,
+}
+
+impl Memory {
+    /// That in this folder.
+    ///
+    /// # Errors
+    /// It is none, or of another version.
+    pub fn read(folder: &Path, graph: &str) -> Result<Self, Box<dyn Error>> {
+        let ring = folder.join(RING);
+        Ok(Self {
+            until: fs::metadata(&ring)?.modified()?,
+            ring: RingReader::open(&ring)?,
+            graph: RunningGraph::read_document(graph, &folder.join(DOCUMENT))?,
+            events: folder.join(EVENTS),
+        })
+    }
+}
+
+/// Begins to keep; what a process before this one has kept is gone. If there is no room, what is
+/// not yet written makes some, the oldest first.
 ///
 /// # Errors
-/// The system's: also that there is no room for all of it.
+/// The system's: also that there is no room all the same.
 pub fn create(running: &RunningGraph) -> io::Result<RingWriter> {
-    let folder = running.domain.memory_folder();
+    let (domain, bytes) = (&running.domain, running.setup.file.blackbox.memory_bytes());
+    let folder = domain.memory_folder();
     remove(&folder);
     fs::create_dir(&folder)?;
-    fs::copy(running.domain.document_file(), folder.join(DOCUMENT))?;
-    let bytes = running.setup.file.blackbox.memory_bytes();
-    RingWriter::create(&folder.join(RING), bytes)
+    let document = running.document.to_text().map_err(io::Error::other)?;
+    let mut unwritten = unwritten(domain).into_iter();
+    loop {
+        let text = fs::write(folder.join(DOCUMENT), &document);
+        match text.and_then(|()| RingWriter::create(&folder.join(RING), bytes)) {
+            Err(error) if error.kind() == io::ErrorKind::StorageFull => match unwritten.next() {
+                Some(oldest) => remove(&oldest),
+                None => return Err(error),
+            },
+            made => return made,
+        }
+    }
 }
 
 /// Forgets it.
@@ -32,43 +74,91 @@ pub fn remove(folder: &Path) {
     let _ = fs::remove_dir_all(folder);
 }
 
-/// Puts aside what a process before this one has kept, until it is written. If there is no place
-/// left, the oldest that is not yet written makes room for it.
-pub fn set_aside(domain: &Domain) {
+/// Puts aside what a process before this one has kept, with the events until then, until it is
+/// written. If there is no place left, the oldest that is not yet written makes room for it.
+///
+/// # Errors
+/// The system's.
+pub fn set_aside(domain: &Domain) -> io::Result<()> {
     let folder = domain.memory_folder();
-    if RingReader::open(&folder.join(RING)).is_err() {
-        return;
+    if RingReader::open(&folder.join(RING)).is_ok_and(|ring| !ring.is_empty()) {
+        // Blocks are worth more than words: without room for these it goes on.
+        let _ = copy_events(&domain.events_file(), &folder.join(EVENTS));
+        let mut free = domain.unwritten_folders().into_iter();
+        let free = free.find(|place| !place.exists());
+        if let Some(place) = free.or_else(|| unwritten(domain).into_iter().next()) {
+            remove(&place);
+            fs::rename(&folder, &place)?;
+        }
     }
-    // A free place is older than all.
-    let mut places = domain.unwritten_folders();
-    places.sort_by_key(|place| kept_until(place));
-    remove(&places[0]);
-    let _ = fs::rename(folder, &places[0]);
+    remove(&folder);
+    Ok(())
 }
 
-/// When it was last written to; `None` if there is none.
-pub fn kept_until(folder: &Path) -> Option<SystemTime> {
-    fs::metadata(folder.join(RING)).ok()?.modified().ok()
+fn copy_events(from: &Path, to: &Path) -> io::Result<()> {
+    let (mut events, mut copy) = (EventReader::open(from), EventWriter::append(to)?);
+    while let Some(entry) = events.next_entry()? {
+        copy.write(&entry)?;
+    }
+    Ok(())
 }
 
-/// What was put aside and is not yet written.
+/// What was put aside and is not yet written, the oldest first.
 pub fn unwritten(domain: &Domain) -> Vec<PathBuf> {
+    let until = |folder: &Path| fs::metadata(folder.join(RING)).and_then(|ring| ring.modified());
     let folders = domain.unwritten_folders().into_iter();
-    folders.filter(|folder| folder.exists()).collect()
+    let mut folders: Vec<_> = folders.filter(|folder| folder.exists()).collect();
+    folders.sort_by_key(|folder| until(folder).ok());
+    folders
 }
 
-/// The last seconds that lie in a folder.
-///
-/// # Errors
-/// The system's; it is no ring.
-pub fn ring(folder: &Path) -> io::Result<RingReader> {
-    RingReader::open(&folder.join(RING))
-}
+#[cfg(test)]
+mod tests {
+    use vigil_cycle::domain::Queues;
 
-/// The graph that they are of.
-///
-/// # Errors
-/// What it ran on cannot be read.
-pub fn graph(folder: &Path, name: &str) -> Result<RunningGraph, NotRunning> {
-    RunningGraph::read_document(name, &folder.join(DOCUMENT))
+    use super::*;
+
+    /// A place of its own, in which a ring with this number of records lies as the present one.
+    fn keep(domain: &Domain, records: u64) {
+        let folder = domain.memory_folder();
+        fs::create_dir(&folder).unwrap();
+        let mut ring = RingWriter::create(&folder.join(RING), 16 << 10).unwrap();
+        for number in 0..records {
+            ring.push(1, number, &[7; 32]).unwrap();
+        }
+        ring.commit().unwrap();
+    }
+
+    fn records(folder: &Path) -> usize {
+        let mut ring = RingReader::open(&folder.join(RING)).unwrap();
+        std::iter::from_fn(|| ring.next_record().unwrap()).count()
+    }
+
+    #[test]
+    fn two_that_are_not_written_stay_and_the_oldest_makes_room() {
+        let graph = format!("t{}-memory", std::process::id());
+        let domain = Domain::new(&graph, Queues::default()).unwrap();
+        for count in [1, 2, 3] {
+            keep(&domain, count);
+            set_aside(&domain).unwrap();
+            assert!(!domain.memory_folder().exists());
+            // Their age tells them apart.
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        let kept: Vec<usize> = unwritten(&domain).iter().map(|it| records(it)).collect();
+        assert_eq!(kept, [2, 3]);
+        // Neither an empty one nor what is none takes the place of another.
+        keep(&domain, 0);
+        set_aside(&domain).unwrap();
+        fs::create_dir(domain.memory_folder()).unwrap();
+        fs::write(domain.memory_folder().join(RING), "no ring").unwrap();
+        set_aside(&domain).unwrap();
+        let kept: Vec<usize> = unwritten(&domain).iter().map(|it| records(it)).collect();
+        assert_eq!(kept, [2, 3]);
+        assert!(!domain.memory_folder().exists());
+        set_aside(&domain).unwrap();
+        // Without what it ran on it cannot be written.
+        assert!(Memory::read(&unwritten(&domain)[0], &graph).is_err());
+        fs::remove_dir_all(domain.folder()).unwrap();
+    }
 }

@@ -109,7 +109,9 @@ pub struct Material {
     /// Text of that, for an exact replay.
     document: String,
     /// Where recordings lie.
-    destination: Destination,
+    pub destination: Destination,
+    /// The launcher's file of events.
+    pub events: PathBuf,
     /// Blocks that came and were overwritten before they were taken, so far.
     pub lost: AtomicU64,
 }
@@ -119,6 +121,9 @@ pub struct Material {
 pub enum Destination {
     /// In a folder of bounded size, each with a name of its own.
     Folder(RecordingsFolder),
+    /// The same, of what stays in memory until it is written: a part of it is of no use, and who
+    /// runs the graph sees to the folder's bound.
+    Rescue(RecordingsFolder),
     /// In this file; what lies there is replaced.
     File(PathBuf),
 }
@@ -212,7 +217,7 @@ fn write(
         file,
         ring,
         pending: None,
-        events: EventReader::open(&material.running.domain.events_file()),
+        events: EventReader::open(&material.events),
         pending_event: None,
         blocks: 0,
         bounds_ns: None,
@@ -230,7 +235,9 @@ fn write(
         Err(error) => {
             let part = part_path(&path);
             match (&error, destination) {
-                (RecordingError::Nothing, _) => _ = std::fs::remove_file(part),
+                (RecordingError::Nothing, _) | (_, Destination::Rescue(_)) => {
+                    _ = std::fs::remove_file(part);
+                }
                 (_, Destination::Folder(_)) => _ = folder::adopt(&part),
                 (_, Destination::File(_)) => {}
             }
@@ -242,13 +249,15 @@ fn write(
 impl Destination {
     fn name(&self, cause: &Cause, clock: &WallClock) -> PathBuf {
         match self {
-            Self::Folder(folder) => folder.name(&clock.rfc3339(cause.t_ns), cause.reason.word()),
+            Self::Folder(folder) | Self::Rescue(folder) => {
+                folder.name(&clock.rfc3339(cause.t_ns), cause.reason.word())
+            }
             Self::File(path) => path.clone(),
         }
     }
 
-    /// Makes room for `more` bytes; a file of somebody's own has no bound.
-    fn prune(&self, more: u64) {
+    /// Makes room for `more` bytes, in a folder whose bound this process sees to.
+    pub fn prune(&self, more: u64) {
         if let Self::Folder(folder) = self {
             folder.prune(more);
         }
@@ -265,6 +274,7 @@ impl Material {
             document: running.document.to_text()?,
             destination,
             lost: AtomicU64::new(0),
+            events: running.domain.events_file(),
             running,
         })
     }

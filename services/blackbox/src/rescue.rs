@@ -1,23 +1,34 @@
 //! Writes what black boxes have kept that were killed. It stays in memory until it is written.
 
 use std::error::Error;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
 
 use vigil_cycle::{Clock, Domain, Monotonic};
 
 use crate::folder::RecordingsFolder;
-use crate::memory;
+use crate::memory::{self, Memory};
 use crate::reason::Reason;
 use crate::recorder::{Cause, Destination, Material, Order, Recording, RecordingError};
 use crate::say::{say, tell};
 
-/// Writes all of it, and waits for that.
-pub fn run(domain: &Domain) {
-    memory::set_aside(domain);
+/// Time between the last block and the last event that belongs to it, ns.
+const MARGIN_NS: u64 = 1_000_000_000;
+
+/// Writes what every killed black box of a graph has kept, and waits for that.
+///
+/// # Errors
+/// A black box that lives writes it itself; what the last one kept cannot be put aside.
+pub fn run(domain: &Domain) -> Result<(), Box<dyn Error>> {
+    let listed = domain.processes().blackbox;
+    if listed.and_then(|pid| domain.find_process(pid)).is_some() {
+        return Err("another of this graph lives".into());
+    }
+    memory::set_aside(domain)?;
     let rescues = Rescue::start_all(domain);
     rescues.into_iter().for_each(Rescue::finish);
+    Ok(())
 }
 
 /// What an earlier process has kept, while it is being written.
@@ -27,16 +38,22 @@ pub struct Rescue {
 }
 
 impl Rescue {
-    /// Begins to write all that was put aside; what cannot be read is removed.
+    /// Begins to write all that was put aside. What cannot be read by this version is removed;
+    /// what cannot be written now stays.
     pub fn start_all(domain: &Domain) -> Vec<Self> {
         let mut rescues = Vec::new();
         for folder in memory::unwritten(domain) {
-            match start(domain, &folder) {
-                Ok(recording) => rescues.push(Self { recording, folder }),
+            let kept = match Memory::read(&folder, domain.graph()) {
+                Ok(kept) => kept,
                 Err(error) => {
                     say(&format!("what a black box kept is lost: {error}"));
                     memory::remove(&folder);
+                    continue;
                 }
+            };
+            match start(kept) {
+                Ok(recording) => rescues.push(Self { recording, folder }),
+                Err(error) => put_off(&error, &folder),
             }
         }
         rescues
@@ -51,10 +68,7 @@ impl Rescue {
     pub fn finish(self) {
         match self.recording.finish() {
             Err(error @ (RecordingError::Flight(_) | RecordingError::Events(_))) => {
-                let folder = self.folder.display();
-                say(&format!(
-                    "no recording: {error}; {folder} is kept until then"
-                ));
+                put_off(&error, &self.folder);
             }
             ended => {
                 tell(ended);
@@ -64,26 +78,29 @@ impl Rescue {
     }
 }
 
-fn start(domain: &Domain, folder: &Path) -> Result<Recording, Box<dyn Error>> {
-    let ring = memory::ring(folder)?;
-    let running = memory::graph(folder, domain.graph())?;
-    let recordings = RecordingsFolder::find(&running)?;
-    let material = Material::new(running, Destination::Folder(recordings))?;
-    let now_ns = Monotonic.now_ns();
-    let age = memory::kept_until(folder).and_then(|time| time.elapsed().ok());
+fn put_off(error: &dyn Display, folder: &Path) {
+    let folder = folder.display();
+    say(&format!(
+        "no recording: {error}; {folder} keeps it for the next start"
+    ));
+}
+
+fn start(kept: Memory) -> Result<Recording, Box<dyn Error>> {
+    let recordings = RecordingsFolder::find(&kept.graph)?;
+    let mut material = Material::new(kept.graph, Destination::Rescue(recordings))?;
+    material.events = kept.events;
+    let age = kept.until.elapsed().unwrap_or_default();
+    let age_ns = u64::try_from(age.as_nanos()).unwrap_or(u64::MAX);
+    let t_ns = Monotonic.now_ns().saturating_sub(age_ns);
     let order = Order {
         cause: Cause {
             reason: Reason::Crash,
-            t_ns: now_ns.saturating_sub(age.as_ref().map_or(0, nanoseconds)),
+            t_ns,
             text: "the black box was killed".to_owned(),
         },
         from_ns: 0,
-        until_ns: now_ns,
-        until_ns_max: now_ns,
+        until_ns: t_ns + MARGIN_NS,
+        until_ns_max: t_ns + MARGIN_NS,
     };
-    Ok(Recording::start(&Arc::new(material), ring, order))
-}
-
-fn nanoseconds(time: &Duration) -> u64 {
-    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
+    Ok(Recording::start(&Arc::new(material), kept.ring, order))
 }

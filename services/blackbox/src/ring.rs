@@ -282,6 +282,11 @@ impl RingReader {
         }
     }
 
+    /// True if nothing was committed so far.
+    pub fn is_empty(&self) -> bool {
+        self.offsets.newest.load(Ordering::Acquire) == 0
+    }
+
     /// Times at which the writer was faster, and records were lost.
     pub const fn overtaken(&self) -> u64 {
         self.overtaken

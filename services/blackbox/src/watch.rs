@@ -15,7 +15,7 @@ use crate::folder::RecordingsFolder;
 use crate::memory;
 use crate::reason::Reason;
 use crate::recorder::{Cause, Destination, Material, Order, Recording};
-use crate::rescue::{self, Rescue};
+use crate::rescue::Rescue;
 use crate::ring::RingWriter;
 use crate::say::{say, tell};
 
@@ -37,16 +37,20 @@ pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     let since_misses_ns = folder.since_misses().map(|time| time.as_nanos() as u64);
     let miss_ns = since_misses_ns.and_then(|since_ns| Monotonic.now_ns().checked_sub(since_ns));
     let material = Arc::new(Material::new(running, Destination::Folder(folder))?);
+    material.destination.prune(0);
     let domain = &material.running.domain;
-    memory::set_aside(domain);
+    if let Err(error) = memory::set_aside(domain) {
+        say(&format!("what a black box kept is lost: {error}"));
+    }
+    let ring = memory::create(&material.running);
     let mut rescues = Rescue::start_all(domain);
-    let kept = keep(&material, miss_ns, &mut rescues);
+    let kept = ring.map_err(Into::into);
+    let kept = kept.and_then(|ring| keep(&material, ring, miss_ns, &mut rescues));
     // Whatever happened: what was left is written before this process ends.
     rescues.into_iter().for_each(Rescue::finish);
     kept?;
-    // An orderly end: nothing is left to be rescued, but what there was no room for.
+    // An orderly end: nothing of this drive is left to be rescued.
     memory::remove(&domain.memory_folder());
-    rescue::run(domain);
     Ok(())
 }
 
@@ -54,12 +58,12 @@ pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
 /// `miss_ns`.
 fn keep(
     material: &Arc<Material>,
+    ring: RingWriter,
     miss_ns: Option<u64>,
     rescues: &mut Vec<Rescue>,
 ) -> Result<(), Box<dyn Error>> {
     let (domain, setup) = (&material.running.domain, &material.running.setup);
     let settings = &setup.file.blackbox;
-    let ring = memory::create(&material.running)?;
     let mut feeds = Feeds::open(&Graph::SharedMemory(Link::join(domain, "blackbox")?))?;
     let mut blackbox = Blackbox {
         before_ns: (settings.before_s * NS) as u64,
@@ -80,7 +84,10 @@ fn keep(
         }
         blackbox.look(&mut feeds)?;
         let over = rescues.extract_if(.., |rescue| rescue.is_over());
-        over.for_each(Rescue::finish);
+        over.for_each(|rescue| {
+            rescue.finish();
+            material.destination.prune(0);
+        });
     }
     let last = blackbox.recordings.into_iter();
     last.map(Recording::finish).for_each(tell);

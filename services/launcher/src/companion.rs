@@ -140,12 +140,16 @@ pub fn rescue(plan: &Plan, domain: &Domain) {
         ],
         program: plan.programs.join("vigil-blackbox"),
     };
-    // Without one, or if it fails, the graph starts all the same.
-    if let Ok(mut process) = Process::start(command)
-        && !process.wait(STOP_LIMIT)
-    {
-        process.kill();
-        process.wait(KILL_LIMIT);
+    // Without one, or if it fails, it stays; the graph starts all the same.
+    match Process::start(command) {
+        Ok(mut process) => {
+            if !process.wait(STOP_LIMIT) {
+                tell!("vigil: what a killed black box kept was not written in time; it stays");
+                process.kill();
+                process.wait(KILL_LIMIT);
+            }
+        }
+        Err(error) => tell!("vigil: what a killed black box kept is not written: {error}"),
     }
 }
 

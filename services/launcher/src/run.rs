@@ -184,6 +184,7 @@ impl OwnGraph {
         last.iter().for_each(|entry| teller.tell(entry));
         teller.tell_misses(u64::MAX);
         children.stop_blackbox();
+        companion::rescue(&plan, &domain);
         let summary = summary(&plan, &observer, &children, ended);
         drop(observer);
         domain.remove_residue();

@@ -156,7 +156,7 @@ impl FaultBoard {
             let is_ours = control.header.schema == Control::SCHEMA;
             let is_done = is_ours && step.obey(command, fault, now_ns);
             if is_ours {
-                // The entry says it all: who sent the block is gone before a recording sees it.
+                // The entry says it all: the sender may be gone before a recording sees the block.
                 let entry = JournalEntry::new(JournalKind::Ordered, command).about(fault);
                 journal.note(entry.with_input(id).at(now_ns));
             }

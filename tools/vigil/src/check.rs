@@ -251,7 +251,8 @@ fn blackbox(setup: &Setup) -> Finding {
     }
     let graph = &setup.file.graph;
     let detail = format!(
-        "{} MiB of memory, {:.0} s at {} Hz; at most {} MiB of recordings",
+        "{} MiB of memory (three times that while killed ones are unwritten), {:.0} s at {} Hz; \
+         at most {} MiB of recordings",
         settings.memory_mib,
         settings.memory_s(graph.rate_hz),
         graph.rate_hz,

@@ -24,8 +24,8 @@ pub struct Blackbox {
     /// that can be written, else the user's own, `~/.local/state/vigil`.
     pub folder: String,
     /// Memory for the last seconds; what does not fit is dropped, the oldest first. A rover at 100
-    /// Hz fills 1.1 MiB a second. Of black boxes that were killed as much stays until it is
-    /// written, twice at most.
+    /// Hz fills 1.1 MiB a second. Each killed black box takes as much again until its memory is
+    /// written; two at most.
     #[default(80)]
     #[schemars(range(min = 4, max = 8192))]
     pub memory_mib: u32,
