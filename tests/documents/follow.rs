@@ -6,6 +6,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::time::{Duration, Instant};
 
 use crate::blocks::{Block, Kind, of_document, shape};
@@ -30,6 +31,17 @@ const RETRIES: usize = 2;
 const SHORT_S: &str = "2";
 /// What a command's lines are awaited in steps of.
 const STEP: Duration = Duration::from_millis(20);
+
+/// Documents are followed side by side; a further try has the machine to itself.
+static MACHINE: RwLock<()> = RwLock::new(());
+
+fn shared_machine() -> RwLockReadGuard<'static, ()> {
+    MACHINE.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn machine() -> RwLockWriteGuard<'static, ()> {
+    MACHINE.write().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// A folder that looks like the project's; removed when dropped.
 struct Workplace(PathBuf);
@@ -254,6 +266,7 @@ fn shapes(block: &Block) -> Vec<String> {
 struct Window {
     process: Process,
     graph: String,
+    _machine: RwLockReadGuard<'static, ()>,
 }
 
 /// A document that is being followed.
@@ -286,6 +299,10 @@ impl Follower<'_> {
     fn run(&self, block: &Block, exit: Option<i32>, shown: &[String]) {
         let place = self.place(block);
         let commands = block.commands();
+        // An open window has it already.
+        let is_first = self.window.is_none();
+        let mut shared = is_first.then(shared_machine);
+        let mut alone = None;
         for (index, command) in commands.iter().enumerate() {
             let is_awaited = index + 1 == commands.len() && !shown.is_empty();
             let mut process = self.start(block, command, is_awaited);
@@ -294,6 +311,9 @@ impl Follower<'_> {
                 for _ in 0..RETRIES {
                     if process.expect_unless_missed(&place, shown, true) {
                         break;
+                    }
+                    if shared.take().is_some() {
+                        alone = Some(machine());
                     }
                     process = self.start(block, command, is_awaited);
                 }
@@ -304,6 +324,7 @@ impl Follower<'_> {
             }
             process.finish(&place, exit);
         }
+        drop(alone);
     }
 
     fn open_window(&mut self, block: &Block) {
@@ -311,26 +332,29 @@ impl Follower<'_> {
         assert!(self.window.is_none(), "{place}: a window is open already");
         let commands = block.commands();
         assert_eq!(commands.len(), 1, "{place}: a window has one command");
+        let machine = shared_machine();
         let mut process = self.start(block, &commands[0], true);
         // From here on a simulator can be broken; a publisher waits for its graph itself.
         if !commands[0].contains("--source") {
             process.expect(&place, &[shape("0.0 s sensor-sim ready")]);
         }
         let graph = self.graph(block);
-        self.window = Some(Window { process, graph });
+        self.window = Some(Window {
+            process,
+            graph,
+            _machine: machine,
+        });
     }
 
     /// Waits for the lines that the window shows, and ends it as Ctrl-C would.
     fn close_window(&mut self, block: &Block) {
         let place = self.place(block);
         let window = self.window.take();
-        let mut process = window
-            .unwrap_or_else(|| panic!("{place}: no window"))
-            .process;
-        process.expect(&place, &shapes(block));
-        process.terminate();
+        let mut window = window.unwrap_or_else(|| panic!("{place}: no window"));
+        window.process.expect(&place, &shapes(block));
+        window.process.terminate();
         // A publisher that has ended may have left the graph blind.
-        process.finish(&place, None);
+        window.process.finish(&place, None);
     }
 }
 

@@ -5,13 +5,13 @@ use std::error::Error;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 use vigil_cycle::Domain;
 use vigil_setup::RunningGraph;
 use vigil_timeline::{EventReader, EventWriter};
 
 use crate::ring::{RingReader, RingWriter};
+use crate::say::say;
 
 const RING: &str = "ring";
 const DOCUMENT: &str = "document";
@@ -21,8 +21,8 @@ const EVENTS: &str = "events";
 pub struct Memory {
     /// The last seconds.
     pub ring: RingReader,
-    /// When it was last written to.
-    pub until: SystemTime,
+    /// When its first and its last block came, `CLOCK_MONOTONIC` ns.
+    pub bounds_ns: [u64; 2],
     /// The graph that it is of.
     pub graph: RunningGraph,
     /// The events until then.
@@ -36,8 +36,13 @@ impl Memory {
     /// It is none, or of another version.
     pub fn read(folder: &Path, graph: &str) -> Result<Self, Box<dyn Error>> {
         let ring = folder.join(RING);
+        let mut blocks = RingReader::open(&ring)?;
+        // What is broken ends it.
+        let mut times_ns = std::iter::from_fn(|| blocks.next_record().ok().flatten());
+        let first_ns = times_ns.next().ok_or("it holds no block")?.t_ns;
+        let last_ns = times_ns.last().map_or(first_ns, |block| block.t_ns);
         Ok(Self {
-            until: fs::metadata(&ring)?.modified()?,
+            bounds_ns: [first_ns, last_ns],
             ring: RingReader::open(&ring)?,
             graph: RunningGraph::read_document(graph, &folder.join(DOCUMENT))?,
             events: folder.join(EVENTS),
@@ -45,28 +50,18 @@ impl Memory {
     }
 }
 
-/// Begins to keep; what a process before this one has kept is gone. If there is no room, what is
-/// not yet written makes some, the oldest first.
+/// Begins to keep; what a process before this one has kept is gone.
 ///
 /// # Errors
-/// The system's: also that there is no room all the same.
+/// The system's: also that there is no room for all of it.
 pub fn create(running: &RunningGraph) -> io::Result<RingWriter> {
     let (domain, bytes) = (&running.domain, running.setup.file.blackbox.memory_bytes());
     let folder = domain.memory_folder();
     remove(&folder);
     fs::create_dir(&folder)?;
     let document = running.document.to_text().map_err(io::Error::other)?;
-    let mut unwritten = unwritten(domain).into_iter();
-    loop {
-        let text = fs::write(folder.join(DOCUMENT), &document);
-        match text.and_then(|()| RingWriter::create(&folder.join(RING), bytes)) {
-            Err(error) if error.kind() == io::ErrorKind::StorageFull => match unwritten.next() {
-                Some(oldest) => remove(&oldest),
-                None => return Err(error),
-            },
-            made => return made,
-        }
-    }
+    fs::write(folder.join(DOCUMENT), document)?;
+    RingWriter::create(&folder.join(RING), bytes)
 }
 
 /// Forgets it.
@@ -81,7 +76,13 @@ pub fn remove(folder: &Path) {
 /// The system's.
 pub fn set_aside(domain: &Domain) -> io::Result<()> {
     let folder = domain.memory_folder();
-    if RingReader::open(&folder.join(RING)).is_ok_and(|ring| !ring.is_empty()) {
+    let ring = RingReader::open(&folder.join(RING));
+    if let Err(error) = &ring
+        && error.kind() != io::ErrorKind::NotFound
+    {
+        say(&format!("what a black box kept is lost: {error}"));
+    }
+    if ring.is_ok_and(|ring| !ring.is_empty()) {
         // Blocks are worth more than words: without room for these it goes on.
         let _ = copy_events(&domain.events_file(), &folder.join(EVENTS));
         let mut free = domain.unwritten_folders().into_iter();
@@ -96,6 +97,7 @@ pub fn set_aside(domain: &Domain) -> io::Result<()> {
 }
 
 fn copy_events(from: &Path, to: &Path) -> io::Result<()> {
+    EventWriter::remove(to);
     let (mut events, mut copy) = (EventReader::open(from), EventWriter::append(to)?);
     while let Some(entry) = events.next_entry()? {
         copy.write(&entry)?;

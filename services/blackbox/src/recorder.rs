@@ -191,12 +191,17 @@ impl Recording {
         self.thread.is_finished()
     }
 
+    /// Nothing follows: it ends with what there is.
+    pub fn end(&self) {
+        self.orders.ends.store(true, Ordering::Relaxed);
+    }
+
     /// Nothing follows: writes what there is, and waits for it.
     ///
     /// # Errors
     /// Why it could not be written.
     pub fn finish(self) -> Result<Written, RecordingError> {
-        self.orders.ends.store(true, Ordering::Relaxed);
+        self.end();
         self.thread.join().unwrap_or(Err(RecordingError::Thread))
     }
 }
@@ -216,6 +221,7 @@ fn write(
     let filling = Filling {
         file,
         ring,
+        is_rescue: matches!(destination, Destination::Rescue(_)),
         pending: None,
         events: EventReader::open(&material.events),
         pending_event: None,
@@ -308,6 +314,7 @@ impl Material {
 struct Filling<'a> {
     file: FlightWriter,
     ring: RingReader,
+    is_rescue: bool,
     /// What lies beyond the present end: it belongs to the recording if that is put off.
     pending: Option<Record>,
     events: EventReader,
@@ -367,7 +374,7 @@ impl Filling<'_> {
         loop {
             let next = match self.pending.take() {
                 Some(record) => Some(record),
-                None => self.ring.next_record().map_err(RecordingError::Ring)?,
+                None => self.next_record()?,
             };
             let until_ns = self.orders.causes().until_ns;
             match next {
@@ -390,6 +397,14 @@ impl Filling<'_> {
                     thread::sleep(POLL);
                 }
             }
+        }
+    }
+
+    /// The ring's next block. One that is broken ends what a killed black box kept.
+    fn next_record(&mut self) -> Result<Option<Record>, RecordingError> {
+        match self.ring.next_record() {
+            Err(_) if self.is_rescue => Ok(None),
+            next => next.map_err(RecordingError::Ring),
         }
     }
 

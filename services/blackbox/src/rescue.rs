@@ -5,7 +5,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use vigil_cycle::{Clock, Domain, Monotonic};
+use vigil_cycle::Domain;
 
 use crate::folder::RecordingsFolder;
 use crate::memory::{self, Memory};
@@ -89,18 +89,20 @@ fn start(kept: Memory) -> Result<Recording, Box<dyn Error>> {
     let recordings = RecordingsFolder::find(&kept.graph)?;
     let mut material = Material::new(kept.graph, Destination::Rescue(recordings))?;
     material.events = kept.events;
-    let age = kept.until.elapsed().unwrap_or_default();
-    let age_ns = u64::try_from(age.as_nanos()).unwrap_or(u64::MAX);
-    let t_ns = Monotonic.now_ns().saturating_sub(age_ns);
+    let [first_ns, last_ns] = kept.bounds_ns;
+    let until_ns = last_ns.saturating_add(MARGIN_NS);
     let order = Order {
         cause: Cause {
             reason: Reason::Crash,
-            t_ns,
+            t_ns: last_ns,
             text: "the black box was killed".to_owned(),
         },
-        from_ns: 0,
-        until_ns: t_ns + MARGIN_NS,
-        until_ns_max: t_ns + MARGIN_NS,
+        from_ns: first_ns,
+        until_ns,
+        until_ns_max: until_ns,
     };
-    Ok(Recording::start(&Arc::new(material), kept.ring, order))
+    let recording = Recording::start(&Arc::new(material), kept.ring, order);
+    // Nothing follows.
+    recording.end();
+    Ok(recording)
 }

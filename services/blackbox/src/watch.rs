@@ -2,6 +2,7 @@
 
 use std::error::Error;
 use std::fs;
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread;
@@ -42,16 +43,43 @@ pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     if let Err(error) = memory::set_aside(domain) {
         say(&format!("what a black box kept is lost: {error}"));
     }
-    let ring = memory::create(&material.running);
+    let ring = begin(&material.running);
     let mut rescues = Rescue::start_all(domain);
     let kept = ring.map_err(Into::into);
     let kept = kept.and_then(|ring| keep(&material, ring, miss_ns, &mut rescues));
+    if kept.is_ok() {
+        // An orderly end: nothing of this drive is left to be rescued.
+        memory::remove(&domain.memory_folder());
+    }
     // Whatever happened: what was left is written before this process ends.
     rescues.into_iter().for_each(Rescue::finish);
-    kept?;
-    // An orderly end: nothing of this drive is left to be rescued.
-    memory::remove(&domain.memory_folder());
-    Ok(())
+    kept
+}
+
+/// Begins to keep. If there is no room, what is not yet written is written first; what cannot be
+/// makes room, the oldest first.
+fn begin(running: &RunningGraph) -> io::Result<RingWriter> {
+    let domain = &running.domain;
+    let mut made = memory::create(running);
+    if is_full(&made) {
+        let rescues = Rescue::start_all(domain);
+        rescues.into_iter().for_each(Rescue::finish);
+        made = memory::create(running);
+    }
+    for oldest in memory::unwritten(domain) {
+        if !is_full(&made) {
+            break;
+        }
+        say("there is no room for the last seconds: what a killed black box kept is dropped");
+        memory::remove(&oldest);
+        made = memory::create(running);
+    }
+    made
+}
+
+fn is_full(made: &io::Result<RingWriter>) -> bool {
+    let error = made.as_ref().err();
+    error.is_some_and(|error| error.kind() == io::ErrorKind::StorageFull)
 }
 
 /// Keeps the last seconds, and writes them when there is a reason. Missed cycles were last one at

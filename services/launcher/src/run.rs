@@ -135,6 +135,7 @@ impl OwnGraph {
             domain,
             locks,
         } = self;
+        signal::install();
         if !args.adopt {
             companion::rescue(&plan, &domain);
             domain.remove_residue();
@@ -143,7 +144,6 @@ impl OwnGraph {
                 .begin()
                 .map_err(|cause| LauncherError::file(domain.folder(), cause))?;
         }
-        signal::install();
         let link = Link::join(&domain, "launcher")?;
         let mut observer = HealthObserver::new(link, &plan)?;
         let _awake = args.keep_awake.then(|| plan.keep_awake()).transpose()?;

@@ -8,9 +8,9 @@ use vigil_setup::{NotRunning, RunningArgs};
 use vigil_terminal::{CommandError, Outcome};
 use vigil_timeline::EventWriter;
 
-/// Time that a graph may take to stop: its launcher waits three seconds for each service, and
-/// twenty for the black box to finish a recording.
-const LIMIT: Duration = Duration::from_secs(40);
+/// Time that a graph may take to stop: its launcher waits three seconds for each service, twenty
+/// for the black box to finish a recording, and twenty for what a killed one kept.
+const LIMIT: Duration = Duration::from_secs(60);
 /// Time that a process may take without a launcher.
 const PROCESS_LIMIT: Duration = Duration::from_secs(20);
 /// Between two looks.
