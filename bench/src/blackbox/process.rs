@@ -1,6 +1,6 @@
 //! The process of the black box, as a launcher has it.
 
-use std::fs;
+use std::fs::{self, Metadata};
 use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::PathBuf;
@@ -41,10 +41,11 @@ impl Process {
             return Ok(());
         }
         // That of a process before this one.
-        let ring_before = self.ring();
+        let ring_before = self.ring().map(|ring| ring.ino());
+        let is_new = |ring: Metadata| Some(ring.ino()) != ring_before;
         self.spawn()?;
         let began = Instant::now();
-        while self.ring().is_none_or(|ring| Some(ring) == ring_before) || self.is_unwritten() {
+        while !self.ring().is_some_and(is_new) || self.is_unwritten() {
             let child = self.child.as_mut().map(Child::try_wait).transpose()?;
             if let Some(status) = child.flatten() {
                 return Err(io::Error::other(format!("the black box ended: {status}")));
@@ -57,10 +58,9 @@ impl Process {
         Ok(())
     }
 
-    /// Its ring, by what no other has.
-    fn ring(&self) -> Option<u64> {
-        let ring = fs::metadata(self.domain.memory_folder().join("ring"));
-        ring.ok().map(|ring| ring.ino())
+    /// What the file system says of its ring.
+    fn ring(&self) -> Option<Metadata> {
+        fs::metadata(self.domain.memory_folder().join("ring")).ok()
     }
 
     fn is_unwritten(&self) -> bool {
@@ -143,7 +143,7 @@ impl Process {
 
     /// Its ring, bytes.
     pub fn ring_bytes(&self) -> u64 {
-        fs::metadata(self.domain.memory_folder().join("ring")).map_or(0, |ring| ring.len())
+        self.ring().map_or(0, |ring| ring.len())
     }
 
     fn read(&self, file: &str) -> String {

@@ -97,8 +97,7 @@ pub fn document(plan: &Plan, run: &Run) -> Value {
 pub fn table(run: &Run) -> Vec<String> {
     let mut lines = vec![
         "| black box | p50, us | over off | p99, us | over off | own misses in 100,000 \
-         | more than off \
-         | of others | memory, MiB | ring, MiB | of a core, % |"
+         | more than off | of others | memory, MiB | ring, MiB | of a core, % |"
             .to_owned(),
         "|---|---|---|---|---|---|---|---|---|---|---|".to_owned(),
     ];

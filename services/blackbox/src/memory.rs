@@ -120,7 +120,7 @@ mod tests {
 
     use super::*;
 
-    /// A place of its own, in which a ring with this number of records lies as the present one.
+    /// Keeps this number of records, as a black box does that is killed then.
     fn keep(domain: &Domain, records: u64) {
         let folder = domain.memory_folder();
         fs::create_dir(&folder).unwrap();

@@ -26,9 +26,14 @@ pub fn run(domain: &Domain) -> Result<(), Box<dyn Error>> {
         return Err("another of this graph lives".into());
     }
     memory::set_aside(domain)?;
+    write(domain);
+    Ok(())
+}
+
+/// Writes all that was put aside, and waits for that.
+pub fn write(domain: &Domain) {
     let rescues = Rescue::start_all(domain);
     rescues.into_iter().for_each(Rescue::finish);
-    Ok(())
 }
 
 /// What an earlier process has kept, while it is being written.

@@ -16,7 +16,7 @@ use crate::folder::RecordingsFolder;
 use crate::memory;
 use crate::reason::Reason;
 use crate::recorder::{Cause, Destination, Material, Order, Recording};
-use crate::rescue::Rescue;
+use crate::rescue::{self, Rescue};
 use crate::ring::RingWriter;
 use crate::say::{say, tell};
 
@@ -62,8 +62,7 @@ fn begin(running: &RunningGraph) -> io::Result<RingWriter> {
     let domain = &running.domain;
     let mut made = memory::create(running);
     if is_full(&made) {
-        let rescues = Rescue::start_all(domain);
-        rescues.into_iter().for_each(Rescue::finish);
+        rescue::write(domain);
         made = memory::create(running);
     }
     for oldest in memory::unwritten(domain) {
