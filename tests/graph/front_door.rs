@@ -154,6 +154,12 @@ fn a_graph_whose_launcher_was_killed_is_listed_adopted_and_goes_on() {
     let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(summary["ended"], "stopped");
     assert_eq!(summary["services"]["sensor-sim"]["restarts"], 1);
+    // The summary has what the launcher before has told, too.
+    let count = |kind: &str| {
+        let all = summary["events"].as_array().unwrap();
+        all.iter().filter(|event| event["event"] == kind).count()
+    };
+    assert_eq!((count("injected"), count("adopted")), (told + 1, 1));
     assert_eq!(listed(&name), None);
 }
 

@@ -52,6 +52,37 @@ fn a_restarted_simulator_goes_on_with_its_broken_rover() {
     assert_eq!(injected, ["encoder:LF:zero", "encoder:LF:zero"]);
 }
 
+#[test]
+fn while_a_service_is_replaced_nobody_drives_on_with_a_stuck_wheel() {
+    let _machine = machine();
+    let options = ["--duration", "60", "--inject", "stuck:RM@2"];
+    let mut graph = RunningGraph::start("replaced", &options);
+    let observed = graph.observe();
+    let mut health = HealthWatch::new(&observed);
+    let mut seen = ModeWatch::new(&observed, &graph.setup);
+    eventually("RM_STUCK is named", || {
+        seen.poll().filter(|mode| mode == "RM_STUCK")
+    });
+    for service in ["identifier", "detector", "supervisor"] {
+        eventually("all services run", || health.all_running().then_some(()));
+        let before = health.poll()[service];
+        kill(before.pid);
+        // A detector arms within two seconds.
+        eventually("it is restarted and works", || {
+            let now = health.poll()[service];
+            (now.header.epoch != before.header.epoch && now.cycles > 250).then_some(())
+        });
+    }
+    graph.interrupt();
+    let actions = graph.finish().events("action");
+    let since = actions.iter().skip_while(|action| action.1 == "go_on");
+    let since: Vec<&str> = since.map(|action| action.1.as_str()).collect();
+    assert!(
+        !since.is_empty() && !since.contains(&"go_on"),
+        "{actions:?}"
+    );
+}
+
 pub fn kill(pid: u32) {
     let status = Command::new("kill")
         .args(["-9", &pid.to_string()])

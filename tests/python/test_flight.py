@@ -153,11 +153,32 @@ class BlackBox(unittest.TestCase):
             restarted = [event["service"] for event in map(json.loads, told) if event["event"] == "restarted"]
             self.assertEqual(restarted, ["blackbox"])
             summary = graph.stop()
+        self.assertEqual([event["service"] for event in summary["events"] if event["event"] == "restarted"], restarted)
         times = [log_time for log_time, _ in Flight(path).messages["/joint_states"]]
         # To the last second before it was killed.
         self.assertGreater(times[-1], killed_ns - 1e9)
         self.assertGreater(times[-1] - times[0], 1e9)
         self.assertEqual([service["restarts"] for service in summary["services"].values()], [0, 0, 0, 0])
+
+    def test_what_it_kept_is_written_when_a_graph_without_launcher_is_stopped(self):
+        with Graph("--duration", "60", recordings=self.folder) as graph:
+            ring = graph.wait_until_up() / "memory/ring"
+            found = wait_for(lambda: self.blackbox(graph), "a black box")
+            wait_for(lambda: ring.exists() and "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            second = [BINARIES / "vigil-blackbox", "--graph", graph.name]
+            second = subprocess.run(second, capture_output=True, text=True, timeout=WATCHDOG_S, check=False)
+            self.assertEqual((second.returncode, "lives" in second.stderr), (1, True), second)
+            graph.launcher.kill()
+            graph.launcher.wait()
+            os.kill(found, signal.SIGKILL)
+            said = vigil("stop", "--graph", graph.name)
+            self.assertEqual(said.returncode, 0, said)
+            graph.launcher.communicate()
+            self.assertFalse(ring.exists())
+        flight = Flight(*self.recordings("crash"))
+        self.assertGreater(len(flight.raw["/vigil/raw/sensor"]), 50)
+        told = [message.msg for _, message in flight.messages["/vigil/events"]]
+        self.assertTrue(any("armed" in text for text in told), told)
 
     def test_a_service_that_is_killed_is_a_crash(self):
         with Graph("--duration", "60", recordings=self.folder, before_s=30.0) as graph:

@@ -2,7 +2,7 @@
 //! that whoever finds it after a kill can write it.
 
 use std::error::Error;
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -62,6 +62,23 @@ pub fn create(running: &RunningGraph) -> io::Result<RingWriter> {
     let document = running.document.to_text().map_err(io::Error::other)?;
     fs::write(folder.join(DOCUMENT), document)?;
     RingWriter::create(&folder.join(RING), bytes)
+}
+
+/// Refuses to take the memory of a black box that lives: the ring is locked as long as somebody
+/// writes it.
+///
+/// # Errors
+/// It lives, or the system's.
+pub fn demand_free(domain: &Domain) -> io::Result<()> {
+    let ring = match File::open(domain.memory_folder().join(RING)) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        ring => ring?,
+    };
+    match ring.try_lock_shared() {
+        Err(TryLockError::WouldBlock) => Err(io::Error::other("another of this graph lives")),
+        Err(TryLockError::Error(error)) => Err(error),
+        Ok(()) => Ok(()),
+    }
 }
 
 /// Forgets it.
@@ -149,6 +166,16 @@ mod tests {
         }
         let kept: Vec<usize> = unwritten(&domain).iter().map(|it| records(it)).collect();
         assert_eq!(kept, [2, 3]);
+        // One that is being written is not free.
+        fs::create_dir(domain.memory_folder()).unwrap();
+        let ring = RingWriter::create(&domain.memory_folder().join(RING), 16 << 10).unwrap();
+        let reader = ring.reader();
+        drop(ring);
+        assert!(demand_free(&domain).is_err());
+        drop(reader);
+        demand_free(&domain).unwrap();
+        remove(&domain.memory_folder());
+        demand_free(&domain).unwrap();
         // Neither an empty one nor what is none takes the place of another.
         keep(&domain, 0);
         set_aside(&domain).unwrap();

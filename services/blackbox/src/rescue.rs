@@ -21,10 +21,7 @@ const MARGIN_NS: u64 = 1_000_000_000;
 /// # Errors
 /// A black box that lives writes it itself; what the last one kept cannot be put aside.
 pub fn run(domain: &Domain) -> Result<(), Box<dyn Error>> {
-    let listed = domain.processes().blackbox;
-    if listed.and_then(|pid| domain.find_process(pid)).is_some() {
-        return Err("another of this graph lives".into());
-    }
+    memory::demand_free(domain)?;
     memory::set_aside(domain)?;
     write(domain);
     Ok(())

@@ -1,5 +1,6 @@
 //! The black box: an observer beside the services. The graph drives on without it.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use vigil_cycle::{Domain, FoundProcess};
@@ -126,10 +127,9 @@ impl Companion {
 }
 
 /// Has what was kept by black boxes that were killed written, before the files are gone that say
-/// what happened then.
-pub fn rescue(plan: &Plan, domain: &Domain) {
-    let mut memories = domain.unwritten_folders().into_iter();
-    if !domain.memory_folder().exists() && !memories.any(|folder| folder.exists()) {
+/// what happened then. The black box lies in this folder of `programs`; none may live.
+pub fn rescue(programs: &Path, domain: &Domain) {
+    if !domain.has_memory() {
         return;
     }
     let command = CommandLine {
@@ -138,7 +138,7 @@ pub fn rescue(plan: &Plan, domain: &Domain) {
             "--graph".to_owned(),
             domain.graph().to_owned(),
         ],
-        program: plan.programs.join("vigil-blackbox"),
+        program: programs.join("vigil-blackbox"),
     };
     // Without one, or if it fails, it stays; the graph starts all the same.
     match Process::start(command) {

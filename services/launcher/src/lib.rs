@@ -25,5 +25,6 @@ mod waiting;
 mod watchdog;
 
 pub use args::LauncherArgs;
+pub use companion::rescue;
 pub use run::launch;
 pub use summary::Summary;

@@ -140,11 +140,11 @@ impl HealthObserver {
         }
     }
 
-    /// What an earlier launcher has told is not told again: it stands in the file at `path`.
-    pub fn skip_told(&mut self, path: &Path) {
+    /// What an earlier launcher has told, in the file at `path`, is not told again.
+    pub fn read_told(&mut self, path: &Path) {
         let mut told = EventReader::open(path);
         while let Ok(Some(entry)) = told.next_entry() {
-            self.timeline.skip_told(&entry);
+            self.timeline.add_told(entry);
         }
     }
 

@@ -137,7 +137,7 @@ impl OwnGraph {
         } = self;
         signal::install();
         if !args.adopt {
-            companion::rescue(&plan, &domain);
+            companion::rescue(&plan.programs, &domain);
             domain.remove_residue();
             EventWriter::remove(&domain.events_file());
             domain
@@ -149,7 +149,7 @@ impl OwnGraph {
         let _awake = args.keep_awake.then(|| plan.keep_awake()).transpose()?;
         let mut children = match args.adopt {
             true => {
-                observer.skip_told(&domain.events_file());
+                observer.read_told(&domain.events_file());
                 // What a simulator that is started anew has to know.
                 observer.poll();
                 Children::adopt(&plan, &domain, &mut observer, locks)?
@@ -164,8 +164,7 @@ impl OwnGraph {
         }
         let mut teller = Teller::new(&domain.events_file(), !args.json);
         if args.adopt {
-            let what = "the launcher before was gone";
-            teller.tell(&own_entry(&observer, "launcher", "adopted", what));
+            tell_own(&mut teller, &mut observer, OwnNews::ADOPTED);
         }
         let mut watch = Watch {
             args,
@@ -184,7 +183,7 @@ impl OwnGraph {
         last.iter().for_each(|entry| teller.tell(entry));
         teller.tell_misses(u64::MAX);
         children.stop_blackbox();
-        companion::rescue(&plan, &domain);
+        companion::rescue(&plan.programs, &domain);
         let summary = summary(&plan, &observer, &children, ended);
         drop(observer);
         domain.remove_residue();
@@ -200,18 +199,35 @@ impl OwnGraph {
     }
 }
 
-/// What no service says of itself.
-fn own_entry(observer: &HealthObserver, who: &str, event: &str, what: &str) -> TimelineEntry {
+/// Tells what no service says of itself, now.
+fn tell_own(teller: &mut Teller, observer: &mut HealthObserver, news: OwnNews<'_>) {
     let t_ns = Monotonic.now_ns();
-    TimelineEntry {
+    let entry = TimelineEntry {
         t_s: observer.since_ready_s(),
         t_ns,
         wall: WallClock::now().rfc3339(t_ns),
-        service: who.to_owned(),
-        event: event.to_owned(),
-        what: what.to_owned(),
+        service: news.who.to_owned(),
+        event: news.event.to_owned(),
+        what: news.what.to_owned(),
         ..TimelineEntry::default()
-    }
+    };
+    teller.tell(&entry);
+    observer.timeline.add_own(entry);
+}
+
+/// What no service says of itself.
+struct OwnNews<'a> {
+    who: &'static str,
+    event: &'static str,
+    what: &'a str,
+}
+
+impl OwnNews<'_> {
+    const ADOPTED: Self = Self {
+        who: "launcher",
+        event: "adopted",
+        what: "the launcher before was gone",
+    };
 }
 
 fn claim(domain: &Domain) -> Result<Claim, LauncherError> {
@@ -312,14 +328,14 @@ impl Watch<'_> {
         self.teller.tell_misses(Monotonic.now_ns());
     }
 
-    fn tell_of_blackbox(&mut self, observer: &HealthObserver, children: &mut Children) {
+    fn tell_of_blackbox(&mut self, observer: &mut HealthObserver, children: &mut Children) {
         let (event, what) = match children.take_blackbox_news() {
             Some(CompanionNews::Restarted) => ("restarted", String::new()),
             Some(CompanionNews::GaveUp(what)) => ("gave-up", what),
             None => return,
         };
-        self.teller
-            .tell(&own_entry(observer, "blackbox", event, &what));
+        let (who, what) = ("blackbox", what.as_str());
+        tell_own(self.teller, observer, OwnNews { who, event, what });
     }
 
     /// True, and said, if no action has come in time.

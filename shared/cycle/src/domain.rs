@@ -174,6 +174,13 @@ impl Domain {
         ["unwritten-1", "unwritten-2"].map(|name| self.folder.join(name))
     }
 
+    /// True if a black box was killed and what it kept is not yet written, or if one lives.
+    #[must_use]
+    pub fn has_memory(&self) -> bool {
+        let unwritten = self.unwritten_folders();
+        self.memory_folder().exists() || unwritten.iter().any(|folder| folder.exists())
+    }
+
     /// What a request to the black box begins with that is about a crash.
     pub const CRASH_REQUEST: &str = "crash: ";
 

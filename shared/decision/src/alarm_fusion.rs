@@ -5,6 +5,7 @@ use vigil_blocks::{
     Action, CauseKind, DetectionBelief, Entry, FaultBelief, MODE_BLIND, Readiness, RecoveryKind,
 };
 use vigil_checkpoint::Checkpoint;
+use vigil_robot::DetectorSuccession;
 use vigil_robot::fused_alarm::{FusedAlarm, StageBeliefs};
 
 use crate::inputs::Inputs;
@@ -29,12 +30,14 @@ pub const fn fused_alarm(detection: &DetectionBelief, action: Option<&Action>) -
 }
 
 /// What decisions depend on besides beliefs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Situation {
     /// The detector is blind: no belief counts.
     pub is_blind: bool,
     /// The fused alarm stands: before it, what has no name counts as nothing.
     pub alarm: bool,
+    /// The detector's probability of a fault.
+    pub p_fault: f64,
     /// The robot rests: nothing that it does would show a fault.
     pub rests: bool,
 }
@@ -43,6 +46,11 @@ pub(crate) struct Situation {
 #[derive(Debug, Clone, Checkpoint)]
 pub(crate) struct AlarmFusion {
     alarm: FusedAlarm,
+    succession: DetectorSuccession,
+    /// As in the last detection that counts.
+    detected: bool,
+    detected_t_ns: u64,
+    p_fault: f64,
     /// As in the last detection.
     blind: u32,
     readiness: u32,
@@ -60,6 +68,10 @@ impl AlarmFusion {
     pub(crate) fn new(arming_speed_scale: f64) -> Self {
         Self {
             alarm: FusedAlarm::default(),
+            succession: DetectorSuccession::default(),
+            detected: false,
+            detected_t_ns: 0,
+            p_fault: 0.0,
             blind: 0,
             readiness: Readiness::Arming as u32,
             run_id: 0,
@@ -77,6 +89,7 @@ impl AlarmFusion {
         let Entry::Frame(inputs) = entry else {
             if matches!(entry, Entry::Reset) {
                 self.alarm.reset();
+                self.succession = DetectorSuccession::default();
                 self.readiness = Readiness::Arming as u32;
                 (self.p_nominal, self.faults, self.unanswered) = (1.0, 0, 0);
             }
@@ -124,6 +137,12 @@ impl AlarmFusion {
         let t_ns = detection.header.t_capture_ns;
         let passed_s = t_ns.saturating_sub(self.t_ns) as f64 * 1e-9;
         (self.t_ns, self.readiness) = (t_ns, detection.readiness);
+        if self.succession.counts(detection) {
+            self.detected = detection.alarm != 0;
+            self.detected_t_ns = detection.alarm_t_capture_ns;
+            let p = detection.p_fault;
+            self.p_fault = if p.is_finite() { p } else { 1.0 };
+        }
         self.alarm.take(&StageBeliefs {
             t_ns,
             moved_s: if self.rests() {
@@ -131,9 +150,9 @@ impl AlarmFusion {
             } else {
                 passed_s.min(STEP_MAX_S)
             },
-            alarm: detection.alarm != 0,
-            alarm_t_ns: detection.alarm_t_capture_ns,
-            alarm_count: detection.alarm_count,
+            alarm: self.detected,
+            alarm_t_ns: self.detected_t_ns,
+            alarm_count: self.succession.alarm_count(),
             p_nominal: if is_lost { 0.0 } else { self.p_nominal },
             faults: self.faults,
         });
@@ -144,6 +163,7 @@ impl AlarmFusion {
         Situation {
             is_blind: self.blind != 0,
             alarm: self.alarm.stands(),
+            p_fault: self.p_fault,
             rests: self.rests(),
         }
     }
@@ -222,6 +242,25 @@ mod tests {
             }
             assert_eq!(fusion.situation().alarm, stands, "{unanswered}");
         }
+    }
+
+    #[test]
+    fn the_alarm_of_a_detector_that_was_replaced_stands_until_the_next_one_can_tell() {
+        let mut fusion = AlarmFusion::new(0.5);
+        let mut first = detection(0, 1);
+        (first.header.epoch, first.p_fault) = (1, 0.75);
+        take(&mut fusion, Some(&first), Some(&diagnosis(0.0)));
+        let mut next = |t_ms, readiness| {
+            let mut next = detection(t_ms, 0);
+            (next.header.epoch, next.readiness) = (2, readiness as u32);
+            take(&mut fusion, Some(&next), Some(&diagnosis(0.0)));
+            let Situation { alarm, p_fault, .. } = fusion.situation();
+            (alarm, p_fault)
+        };
+        assert_eq!(next(100, Readiness::Arming), (true, 0.75));
+        assert_eq!(next(5000, Readiness::Armed), (true, 0.75));
+        assert_eq!(next(5400, Readiness::Armed), (true, 0.75));
+        assert_eq!(next(5600, Readiness::Armed), (false, 0.0));
     }
 
     #[test]

@@ -172,13 +172,13 @@ impl FaultDecision {
     }
 
     /// The identifier is lost.
-    fn fall_back(&mut self, detection: &DetectionBelief, alarm: bool) {
+    fn fall_back(&mut self, detection: &DetectionBelief, situation: Situation) {
         self.begin_run(detection.run_id);
         let t_capture_ns = detection.header.t_capture_ns;
         self.pass_time(t_capture_ns);
         let process = &mut self.process;
         let belief = process.tracker.belief();
-        write_fallback(detection, &self.states, alarm, belief, &mut process.scratch);
+        write_fallback(situation, &self.states, belief, &mut process.scratch);
         process.tracker.anchor(&process.scratch);
         process.control_mode = ControlMode::Fallback;
         process.log_evidence = 0.0;
@@ -244,7 +244,7 @@ impl DecisionRule for FaultDecision {
                 self.take_diagnosis(diagnosis, situation);
             }
             (None, Some(detection)) if self.process.losses.identifier_is_lost() => {
-                self.fall_back(detection, situation.alarm);
+                self.fall_back(detection, situation);
             }
             _ => {}
         }

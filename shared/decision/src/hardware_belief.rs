@@ -1,6 +1,6 @@
 //! What is known of the hardware, for a model of navigation and hardware together.
 
-use vigil_blocks::{DECISION_STATES, DetectionBelief, FaultBelief};
+use vigil_blocks::{DECISION_STATES, FaultBelief};
 use vigil_checkpoint::Checkpoint;
 use vigil_pomdp::Pomdp;
 use vigil_robot::FaultTree;
@@ -65,14 +65,9 @@ impl HardwareBelief {
     }
 
     /// Takes what the detector says in the identifier's place.
-    pub(crate) fn take_alarm(
-        &mut self,
-        detection: &DetectionBelief,
-        situation: Situation,
-        belief: &[f64],
-    ) {
+    pub(crate) fn take_alarm(&mut self, situation: Situation, belief: &[f64]) {
         self.take_by(situation.rests, belief, |states, predicted, p| {
-            write_fallback(detection, states, situation.alarm, predicted, p);
+            write_fallback(situation, states, predicted, p);
         });
     }
 

@@ -15,8 +15,9 @@
 //! What has no name is nothing before the fused alarm: the odds of a departure wander on a healthy
 //! robot too, and the alarm alone is calibrated.
 
-use vigil_blocks::{DetectionBelief, FaultBelief, FaultSet};
+use vigil_blocks::{FaultBelief, FaultSet};
 
+use crate::alarm_fusion::Situation;
 use crate::answerable::AnswerableFaults;
 use crate::states::{StateMeaning, Subject};
 
@@ -80,14 +81,13 @@ pub(crate) fn write_weights(
 /// the loss which one, and without that it is unknown. Before an alarm the detector's odds mean
 /// nothing.
 pub(crate) fn write_fallback(
-    detection: &DetectionBelief,
+    situation: Situation,
     states: &[StateMeaning],
-    alarm: bool,
     before: &[f64],
     weights: &mut [f64],
 ) {
-    let p_fault = match alarm {
-        true => detection.p_fault.clamp(0.0, 1.0),
+    let p_fault = match situation.alarm {
+        true => situation.p_fault.clamp(0.0, 1.0),
         false => 0.0,
     };
     let is_fault =

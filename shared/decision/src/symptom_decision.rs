@@ -132,7 +132,7 @@ impl SymptomDecision {
         if !(0.0..=1.0).contains(&detection.p_fault) {
             self.process.refuse();
         } else if let Some(hardware) = &mut self.hardware {
-            hardware.take_alarm(detection, situation, self.process.tracker.belief());
+            hardware.take_alarm(situation, self.process.tracker.belief());
             self.follow_hardware(false);
         }
     }

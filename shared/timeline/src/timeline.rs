@@ -18,7 +18,9 @@ const RECORDS_MAX: usize = 100_000;
 pub struct Timeline {
     namer: Namer,
     records: Vec<Record>,
-    /// Those that [`Self::take_new`] has handed out.
+    /// What is not heard from the services: told by another launcher, or of the launcher itself.
+    told: Vec<TimelineEntry>,
+    /// Those records that [`Self::take_new`] has handed out.
     taken: usize,
     overwritten: u64,
     /// Of each service: until when another launcher has told its events, ns.
@@ -35,6 +37,7 @@ impl Timeline {
             namer: Namer::new(setup),
             origin_ns: None,
             records: Vec::new(),
+            told: Vec::new(),
             taken: 0,
             overwritten: 0,
             told_ns: [0; ServiceName::ALL.len()],
@@ -105,9 +108,14 @@ impl Timeline {
         }
     }
 
-    /// An event that another launcher has told: it is not handed out again, nor what lies before
-    /// it, and times count from where they did.
-    pub fn skip_told(&mut self, entry: &TimelineEntry) {
+    /// Adds what no service says of itself; it is not handed out.
+    pub fn add_own(&mut self, entry: TimelineEntry) {
+        self.told.push(entry);
+    }
+
+    /// Adds an event that another launcher has told: it is not handed out again, nor what lies
+    /// before it, and times count from where they did.
+    pub fn add_told(&mut self, entry: TimelineEntry) {
         let service = ServiceName::ALL
             .into_iter()
             .find(|name| name.as_str() == entry.service);
@@ -118,6 +126,7 @@ impl Timeline {
         if let Some(t_s) = entry.t_s {
             self.begin((entry.t_ns as f64 - t_s * 1e9) as u64);
         }
+        self.told.push(entry);
     }
 
     /// Events that were overwritten before they could be read.
@@ -140,9 +149,14 @@ impl Timeline {
         self.recording_end_ns
     }
 
-    /// False for what follows from the end of a recording alone: that input is missing.
-    fn is_shown(&self, event: &Event) -> bool {
+    /// False for what another launcher has told, and for what follows from the end of a recording
+    /// alone: that input is missing.
+    fn is_shown(&self, record: &Record) -> bool {
         use EventKind::{InputBack, InputLost, Miss};
+        let event = &record.event;
+        if event.t_ns <= self.told_ns[record.service.index()] {
+            return false;
+        }
         let is_missing = [Miss, InputLost, InputBack]
             .map(|kind| kind as u32)
             .contains(&event.kind);
@@ -172,10 +186,7 @@ impl Timeline {
         let from = std::mem::replace(&mut self.taken, self.records.len());
         self.records[from..].sort_by_key(|record| record.event.t_ns);
         let new = self.records[from..].iter();
-        let is_new = |record: &&Record| record.event.t_ns > self.told_ns[record.service.index()];
-        let shown = new
-            .filter(is_new)
-            .filter(|record| self.is_shown(&record.event));
+        let shown = new.filter(|record| self.is_shown(record));
         shown
             .map(|record| self.namer.entry(record, origin_ns))
             .collect()
@@ -209,12 +220,11 @@ impl Timeline {
 
     /// Every event in words, in order.
     pub fn entries(&self) -> Vec<TimelineEntry> {
-        let origin_ns = self.origin_ns;
-        let mut sorted: Vec<&Record> = self.records.iter().collect();
-        sorted.sort_by_key(|record| record.event.t_ns);
-        sorted.retain(|record| self.is_shown(&record.event));
-        let entry = |record: &&Record| self.namer.entry(record, origin_ns);
-        sorted.iter().map(entry).collect()
+        let shown = self.records.iter().filter(|record| self.is_shown(record));
+        let shown = shown.map(|record| self.namer.entry(record, self.origin_ns));
+        let mut entries: Vec<TimelineEntry> = self.told.iter().cloned().chain(shown).collect();
+        entries.sort_by_key(|entry| entry.t_ns);
+        entries
     }
 }
 

@@ -2,13 +2,13 @@
 
 mod blocks;
 mod checkpoints;
-mod course;
 mod difference;
 mod error;
 mod replay;
+mod service_replay;
 mod step;
 
-pub use course::Tally;
 pub use difference::Difference;
 pub use error::ReplayError;
 pub use replay::{Answer, Moment, Replay, What};
+pub use service_replay::Tally;

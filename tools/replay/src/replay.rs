@@ -15,9 +15,9 @@ use vigil_flight::{FlightReader, Recorded, read_block};
 use vigil_setup::{Document, Setup};
 
 use crate::blocks::{Blocks, Hypotheses, Window};
-use crate::course::{Course, Standing, Tally, begins};
 use crate::difference::{self, Difference};
 use crate::error::ReplayError;
+use crate::service_replay::{ServiceReplay, Standing, Tally, begins};
 use crate::step::{Answers, Step};
 
 /// The file is read so far ahead of what is computed, ns: it holds topics one after the other, and
@@ -71,7 +71,7 @@ pub struct Moment {
 pub struct Replay {
     file: FlightReader,
     setup: Setup,
-    courses: [Course; 3],
+    services: [ServiceReplay; 3],
     blocks: Blocks,
     answers: Answers,
     moments: VecDeque<Moment>,
@@ -96,11 +96,12 @@ impl Replay {
         let text = file.document().map(str::to_owned);
         let text = text.ok_or_else(|| ReplayError::NoDocument(path.to_owned()))?;
         let setup = Document::from_text(path, text)?.check()?;
-        let course = |service| Step::new(service, &setup).map(|step| Course::new(service, step));
+        let begin =
+            |service| Step::new(service, &setup).map(|step| ServiceReplay::new(service, step));
         let [first, second, third] = ServiceName::STEPPING;
         Ok(Self {
             file,
-            courses: [course(first)?, course(second)?, course(third)?],
+            services: [begin(first)?, begin(second)?, begin(third)?],
             blocks: Blocks::new(3 * AHEAD_NS),
             answers: Answers::default(),
             moments: VecDeque::new(),
@@ -121,8 +122,11 @@ impl Replay {
     /// What became of a service's answers so far.
     #[must_use]
     pub fn tally(&self, service: ServiceName) -> Tally {
-        let found = self.courses.iter().find(|course| course.service == service);
-        found.map_or_else(Tally::default, |course| course.tally)
+        let found = self
+            .services
+            .iter()
+            .find(|replay| replay.service == service);
+        found.map_or_else(Tally::default, |replay| replay.tally)
     }
 
     /// True if the file was cut short.
@@ -170,13 +174,14 @@ impl Replay {
         else {
             return Ok(());
         };
-        let course = |service: ServiceName| move |course: &&mut Course| course.service == service;
+        let is_of =
+            |service: ServiceName| move |replay: &&mut ServiceReplay| replay.service == service;
         match topic {
             Topic::Journal(service) => {
-                let found = self.courses.iter_mut().find(course(service));
+                let found = self.services.iter_mut().find(is_of(service));
                 match found.zip(read_block::<Journal>(bytes)) {
-                    Some((course, block)) => {
-                        course.journal.push_back((log_time_ns, block));
+                    Some((replay, block)) => {
+                        replay.journal.push_back((log_time_ns, block));
                         if self.read_ns == 0 {
                             self.blocks.begin(log_time_ns);
                         }
@@ -186,9 +191,9 @@ impl Replay {
                 }
             }
             Topic::Checkpoint(service) => {
-                let found = self.courses.iter_mut().find(course(service));
+                let found = self.services.iter_mut().find(is_of(service));
                 match found.zip(read_block::<CheckpointPart>(bytes)) {
-                    Some((course, part)) => course.checkpoints.take(&part),
+                    Some((replay, part)) => replay.checkpoints.take(&part),
                     None => self.foreign_count += 1,
                 }
             }
@@ -203,7 +208,7 @@ impl Replay {
     /// Whose journal goes on, if enough of the file is read: the oldest block of all; but the
     /// detector's, as long as it has not answered what the oldest one takes.
     fn due(&self) -> Option<usize> {
-        let fronts = self.courses.iter().map(|course| course.journal.front());
+        let fronts = self.services.iter().map(|replay| replay.journal.front());
         let heads = fronts.enumerate().filter_map(|(place, front)| {
             let (t_ns, block) = front?;
             Some((*t_ns, place, block))
@@ -213,29 +218,29 @@ impl Replay {
             true => DETECTOR,
             false => oldest,
         };
-        let (t_ns, _) = self.courses[place].journal.front()?;
+        let (t_ns, _) = self.services[place].journal.front()?;
         let is_read = self.is_read || t_ns.saturating_add(AHEAD_NS) <= self.read_ns;
         is_read.then_some(place)
     }
 
     /// True if the identifier takes a detection that the detector has yet to answer.
     fn waits(&self, block: &Journal) -> bool {
-        let detector = &self.courses[DETECTOR];
+        let detector = &self.services[DETECTOR];
         // A writer that starts later has the larger epoch.
         let key = |id: BlockId| (id.epoch, id.seq);
         let answered = detector.answered.map(key);
         let mut taken = block.used().iter().filter_map(JournalEntry::detection);
-        self.courses[IDENTIFIER].standing == Standing::Following
+        self.services[IDENTIFIER].standing == Standing::Following
             && !detector.journal.is_empty()
             && taken.any(|id| Some(key(id)) > answered)
     }
 
     /// Computes one block of a journal.
     fn turn(&mut self, place: usize) -> Result<(), ReplayError> {
-        let Some((t_ns, block)) = self.courses[place].journal.pop_front() else {
+        let Some((t_ns, block)) = self.services[place].journal.pop_front() else {
             return Ok(());
         };
-        if let Some(what) = self.courses[place].follow(&block) {
+        if let Some(what) = self.services[place].follow(&block) {
             self.gap(place, t_ns, what);
         }
         let (before, after) = block.around_answer();
@@ -256,24 +261,24 @@ impl Replay {
         entries: &[JournalEntry],
     ) -> Result<(), ReplayError> {
         for entry in entries {
-            let course = &mut self.courses[place];
+            let replay = &mut self.services[place];
             if begins(entry) {
-                let service = course.service;
-                course.step = Step::new(service, &self.setup)?;
-                course.standing = Standing::Following;
-                course.tally.begun += 1;
+                let service = replay.service;
+                replay.step = Step::new(service, &self.setup)?;
+                replay.standing = Standing::Following;
+                replay.tally.begun += 1;
                 self.note(t_ns, service, What::Begins);
-            } else if course.standing == Standing::Following {
+            } else if replay.standing == Standing::Following {
                 let (blocks, answers) = (&self.blocks, &mut self.answers);
                 let taken = panic::catch_unwind(AssertUnwindSafe(|| {
-                    course.step.take(entry, blocks, answers)
+                    replay.step.take(entry, blocks, answers)
                 }));
                 match taken {
                     Ok(Ok(())) => {}
                     Ok(Err(missing)) => self.gap(place, t_ns, missing.as_str()),
                     // The service has answered: its journal is published after the step.
                     Err(_) => {
-                        course.tally.different += 1;
+                        replay.tally.different += 1;
                         self.gap(place, t_ns, ASSERTION_FAILED);
                     }
                 }
@@ -297,25 +302,25 @@ impl Replay {
 
     /// Something is missing: the service waits, if it does not wait already.
     fn gap(&mut self, place: usize, t_ns: u64, what: &str) {
-        let standing = &mut self.courses[place].standing;
+        let standing = &mut self.services[place].standing;
         if std::mem::replace(standing, Standing::Waiting) == Standing::Following {
             self.tell_gap(place, t_ns, what);
         }
     }
 
     fn tell_gap(&mut self, place: usize, t_ns: u64, what: &str) {
-        let course = &mut self.courses[place];
-        course.tally.gaps += 1;
-        let service = course.service;
+        let replay = &mut self.services[place];
+        replay.tally.gaps += 1;
+        let service = replay.service;
         self.note(t_ns, service, What::Gap(what.to_owned()));
     }
 
     /// Compares an answer with what was published.
     fn answer(&mut self, place: usize, t_ns: u64, id: BlockId) {
-        let course = &mut self.courses[place];
-        course.tally.answers += 1;
-        course.answered = Some(id);
-        if course.standing == Standing::Waiting {
+        let replay = &mut self.services[place];
+        replay.tally.answers += 1;
+        replay.answered = Some(id);
+        if replay.standing == Standing::Waiting {
             return;
         }
         let (blocks, answers) = (&mut self.blocks, &mut self.answers);
@@ -334,7 +339,7 @@ impl Replay {
                 (Answer::Diagnosis(answer), compared)
             }
             _ => {
-                course.step.decided(&answers.action);
+                replay.step.decided(&answers.action);
                 let answer = std::mem::take(&mut answers.action);
                 let compared = compared(&blocks.actions, id, &*answer);
                 (Answer::Action(answer), compared)
@@ -345,9 +350,9 @@ impl Replay {
 
     /// Compares the faults with what was published of them.
     fn answer_faults(&mut self, place: usize, t_ns: u64, id: BlockId) {
-        let course = &mut self.courses[place];
-        course.tally.answers += 1;
-        if course.standing == Standing::Following {
+        let replay = &mut self.services[place];
+        replay.tally.answers += 1;
+        if replay.standing == Standing::Following {
             let answer = std::mem::take(&mut self.answers.faults);
             let compared = compared(&self.blocks.faults, id, &*answer);
             self.answered(place, t_ns, Answer::Faults(answer), compared);
@@ -362,12 +367,12 @@ impl Replay {
         answer: Answer,
         compared: Option<Option<Difference>>,
     ) {
-        let course = &mut self.courses[place];
-        let service = course.service;
-        course.tally.compared += u64::from(compared.is_some());
-        course.tally.unrecorded += u64::from(compared.is_none());
+        let replay = &mut self.services[place];
+        let service = replay.service;
+        replay.tally.compared += u64::from(compared.is_some());
+        replay.tally.unrecorded += u64::from(compared.is_none());
         let difference = compared.flatten();
-        course.tally.different += u64::from(difference.is_some());
+        replay.tally.different += u64::from(difference.is_some());
         self.note(t_ns, service, What::Answered(answer, difference));
     }
 
@@ -375,39 +380,39 @@ impl Replay {
     /// with it.
     fn compare_state(&mut self, place: usize, t_ns: u64, id: BlockId) {
         // Its first input is what the detector answers from then on.
-        let detector = self.courses[DETECTOR].standing;
+        let detector = self.services[DETECTOR].standing;
         let can_begin = place != IDENTIFIER || detector == Standing::Following;
-        let course = &mut self.courses[place];
-        let service = course.service;
-        if let Some(bytes) = course.checkpoints.take_too_large()
-            && course.standing == Standing::Waiting
+        let replay = &mut self.services[place];
+        let service = replay.service;
+        if let Some(bytes) = replay.checkpoints.take_too_large()
+            && replay.standing == Standing::Waiting
         {
             let what = format!("a state of {bytes} bytes is too large to be handed out");
             return self.tell_gap(place, t_ns, &what);
         }
-        let Some(recorded) = course.checkpoints.after(id) else {
+        let Some(recorded) = replay.checkpoints.after(id) else {
             return;
         };
-        if course.standing == Standing::Waiting && !can_begin {
+        if replay.standing == Standing::Waiting && !can_begin {
             return;
         }
-        if course.standing == Standing::Following {
-            let computed = course.step.state(&mut self.state);
-            course.tally.states += 1;
+        if replay.standing == Standing::Following {
+            let computed = replay.step.state(&mut self.state);
+            replay.tally.states += 1;
             if computed == Some(recorded.bytes.as_slice()) {
                 return;
             }
             let computed = computed.unwrap_or_default();
             let difference = difference::of_states(id, &recorded.bytes, computed);
-            course.tally.different += 1;
+            replay.tally.different += 1;
             self.note(t_ns, service, What::StateDiffers(difference));
         }
-        let course = &mut self.courses[place];
-        course.standing = Standing::Waiting;
-        match panic::catch_unwind(AssertUnwindSafe(|| course.step.load(&recorded.bytes))) {
+        let replay = &mut self.services[place];
+        replay.standing = Standing::Waiting;
+        match panic::catch_unwind(AssertUnwindSafe(|| replay.step.load(&recorded.bytes))) {
             Ok(Ok(())) => {
-                course.standing = Standing::Following;
-                course.tally.begun += 1;
+                replay.standing = Standing::Following;
+                replay.tally.begun += 1;
                 self.note(t_ns, service, What::Begins);
             }
             Ok(Err(error)) => self.tell_gap(place, t_ns, &error.to_string()),

@@ -30,8 +30,8 @@ const TOLD: Duration = Duration::from_secs(10);
 /// Writes the frames of a publisher to a table, or all of a running graph to a recording.
 ///
 /// A name that ends in .mcap means a recording as the black box writes, of any length, from now on:
-/// `vigil report` and `vigil replay` read it. It goes to FILE.part while it grows, and costs the
-/// graph nothing.
+/// `vigil report` and `vigil replay` read it. It goes to FILE.part while it grows, and the graph's
+/// own black box goes on beside it.
 ///
 /// Any other name means frames as CSV, to learn from or to play back. They are taken beside a
 /// running graph, or in its place while none runs: a model need not be there yet. A pause, a jump

@@ -1,6 +1,7 @@
 //! `vigil stop`: ends a running graph, with its launcher or without.
 
 use std::io::{self, IsTerminal};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use vigil_cycle::{Domain, signal};
@@ -107,6 +108,8 @@ fn stop_services(domain: &Domain) -> Result<(), CommandError> {
     }
     // Who holds the lock now has no service alive.
     if let Some(_lock) = domain.lock().map_err(CommandError::failure)? {
+        let program = std::env::current_exe().map_err(CommandError::failure)?;
+        vigil_launcher::rescue(program.parent().unwrap_or(Path::new(".")), domain);
         domain.remove_residue();
         EventWriter::remove(&domain.events_file());
     }

@@ -7,7 +7,7 @@ use vigil_blocks::{
 use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_robot::channel_model::belief::{ComponentBelief, PairBelief};
 use vigil_robot::channel_model::{Model, Monitor, Observer, components};
-use vigil_robot::{ChannelMap, Description, FaultTree};
+use vigil_robot::{ChannelMap, Description, DetectorSuccession, FaultTree};
 
 use crate::identify::identifier::Input;
 use crate::identify::leaf_map::{IdentifierError, LeafMap};
@@ -68,7 +68,10 @@ pub struct ChannelIdentifier {
     /// Capture time of the last frame, ns, and motion in it, s, until it has been reported.
     t_ns: u64,
     moved_s: f64,
+    /// The detector's alarm, and its probability of a fault.
     alarm_t_ns: u64,
+    p_fault: f64,
+    succession: DetectorSuccession,
 }
 
 impl ChannelIdentifier {
@@ -122,6 +125,8 @@ impl ChannelIdentifier {
             t_ns: 0,
             moved_s: 0.0,
             alarm_t_ns: 0,
+            p_fault: 0.0,
+            succession: DetectorSuccession::default(),
         })
     }
 
@@ -225,11 +230,14 @@ impl ChannelIdentifier {
     fn take(&mut self, detection: &DetectionBelief, dt_s: f64) {
         let moves = detection.readiness == Readiness::Armed as u32 && self.t_ns != 0;
         self.moved_s = if moves { dt_s } else { 0.0 };
-        self.alarm_t_ns = match detection.alarm {
-            0 => 0,
-            _ => detection.alarm_t_capture_ns,
-        };
-        let mut belief = TreeBelief::watching(detection.p_fault);
+        if self.succession.counts(detection) {
+            self.alarm_t_ns = match detection.alarm {
+                0 => 0,
+                _ => detection.alarm_t_capture_ns,
+            };
+            self.p_fault = detection.p_fault;
+        }
+        let mut belief = TreeBelief::watching(self.p_fault);
         let p_fault = belief.unknown;
         if self.alarm_t_ns == 0 {
             self.posterior = belief;

@@ -245,7 +245,7 @@ impl Identifier {
         }
         self.run_id = input.frame.run_id;
         if let Some((belief, _)) = input.detection {
-            self.detection = Detection::from_belief(belief, self.evidence.map());
+            self.detection.take(belief, self.evidence.map());
         }
         if intake.complete {
             self.in_trouble = self.observer.observation().troubles.any(self.use_wheels);
@@ -273,6 +273,7 @@ impl Identifier {
         }
         if let Phase::Identifying(next) = self.phase {
             self.identify(next, intake.complete);
+            self.posterior.cap_nominal(self.detection.p_nominal_max());
         }
     }
 

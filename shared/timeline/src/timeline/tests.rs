@@ -221,7 +221,7 @@ fn what_another_launcher_has_told_is_not_told_again_and_times_go_on() {
     first.add(ServiceName::Detector, &alarm);
     let mut second = timeline();
     for entry in first.take_new(false) {
-        second.skip_told(&entry);
+        second.add_told(entry);
     }
     second.add_overwritten(ServiceName::Detector, 7);
     second.add(ServiceName::Detector, &alarm);
@@ -230,7 +230,13 @@ fn what_another_launcher_has_told_is_not_told_again_and_times_go_on() {
     let new = second.take_new(false);
     let new: Vec<_> = new.iter().map(|e| (e.event.as_str(), e.t_s)).collect();
     assert_eq!(new, [("miss", Some(1.0)), ("cleared", Some(3.0))]);
-    assert_eq!(second.entries().len(), 3, "all that is known");
+    let mut own = second.entries()[0].clone();
+    (own.t_ns, own.event) = (14 * S, "adopted".to_owned());
+    second.add_own(own);
+    let all = second.entries();
+    let all: Vec<&str> = all.iter().map(|entry| entry.event.as_str()).collect();
+    assert_eq!(all, ["miss", "alarm", "cleared", "adopted"]);
+    assert!(second.take_new(false).is_empty());
     assert_eq!(second.overwritten(), 0);
     second.add_overwritten(ServiceName::Detector, 1);
     assert_eq!(second.overwritten(), 1);

@@ -37,8 +37,8 @@ pub(crate) enum Standing {
     Following,
 }
 
-/// One service.
-pub(crate) struct Course {
+/// The steps of one service, computed again.
+pub(crate) struct ServiceReplay {
     pub(crate) service: ServiceName,
     pub(crate) step: Step,
     pub(crate) standing: Standing,
@@ -52,7 +52,7 @@ pub(crate) struct Course {
     last: Option<(BlockId, u32)>,
 }
 
-impl Course {
+impl ServiceReplay {
     pub(crate) fn new(service: ServiceName, step: Step) -> Self {
         Self {
             service,
