@@ -2,8 +2,9 @@
 //! that whoever finds it after a kill can write it.
 
 use std::error::Error;
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
 use vigil_cycle::Domain;
@@ -16,6 +17,7 @@ use crate::say::say;
 const RING: &str = "ring";
 const DOCUMENT: &str = "document";
 const EVENTS: &str = "events";
+const LOCK: &str = "memory-lock";
 
 /// What a black box has kept that was killed.
 pub struct Memory {
@@ -64,20 +66,23 @@ pub fn create(running: &RunningGraph) -> io::Result<RingWriter> {
     RingWriter::create(&folder.join(RING), bytes)
 }
 
-/// Refuses to take the memory of a black box that lives: the ring is locked as long as somebody
-/// writes it.
+/// The right to what a graph's black boxes keep: one process has it, as long as it lives.
+pub struct MemoryLock {
+    _file: File,
+}
+
+/// Takes that right.
 ///
 /// # Errors
-/// It lives, or the system's.
-pub fn demand_free(domain: &Domain) -> io::Result<()> {
-    let ring = match File::open(domain.memory_folder().join(RING)) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        ring => ring?,
-    };
-    match ring.try_lock_shared() {
+/// Another process has it; the system's.
+pub fn lock(domain: &Domain) -> io::Result<MemoryLock> {
+    let mut options = OpenOptions::new();
+    let options = options.create(true).truncate(false).write(true).mode(0o600);
+    let file = options.open(domain.folder().join(LOCK))?;
+    match file.try_lock() {
+        Ok(()) => Ok(MemoryLock { _file: file }),
         Err(TryLockError::WouldBlock) => Err(io::Error::other("another of this graph lives")),
         Err(TryLockError::Error(error)) => Err(error),
-        Ok(()) => Ok(()),
     }
 }
 
@@ -154,6 +159,17 @@ mod tests {
     }
 
     #[test]
+    fn one_process_has_the_right_to_a_memory() {
+        let graph = format!("t{}-lock", std::process::id());
+        let domain = Domain::new(&graph, Queues::default()).unwrap();
+        let first = lock(&domain).unwrap();
+        assert!(lock(&domain).is_err());
+        drop(first);
+        lock(&domain).unwrap();
+        fs::remove_dir_all(domain.folder()).unwrap();
+    }
+
+    #[test]
     fn two_that_are_not_written_stay_and_the_oldest_makes_room() {
         let graph = format!("t{}-memory", std::process::id());
         let domain = Domain::new(&graph, Queues::default()).unwrap();
@@ -166,16 +182,6 @@ mod tests {
         }
         let kept: Vec<usize> = unwritten(&domain).iter().map(|it| records(it)).collect();
         assert_eq!(kept, [2, 3]);
-        // One that is being written is not free.
-        fs::create_dir(domain.memory_folder()).unwrap();
-        let ring = RingWriter::create(&domain.memory_folder().join(RING), 16 << 10).unwrap();
-        let reader = ring.reader();
-        drop(ring);
-        assert!(demand_free(&domain).is_err());
-        drop(reader);
-        demand_free(&domain).unwrap();
-        remove(&domain.memory_folder());
-        demand_free(&domain).unwrap();
         // Neither an empty one nor what is none takes the place of another.
         keep(&domain, 0);
         set_aside(&domain).unwrap();

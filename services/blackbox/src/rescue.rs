@@ -21,7 +21,7 @@ const MARGIN_NS: u64 = 1_000_000_000;
 /// # Errors
 /// A black box that lives writes it itself; what the last one kept cannot be put aside.
 pub fn run(domain: &Domain) -> Result<(), Box<dyn Error>> {
-    memory::demand_free(domain)?;
+    let _lock = memory::lock(domain)?;
     memory::set_aside(domain)?;
     write(domain);
     Ok(())

@@ -80,8 +80,7 @@ fn word(file: &File, at: u64) -> io::Result<u64> {
 }
 
 impl RingWriter {
-    /// Begins a ring of `bytes` at `path`; what lies there is gone. The file is locked until this
-    /// and the last of its readers is gone.
+    /// Begins a ring of `bytes` at `path`; what lies there is gone.
     ///
     /// # Errors
     /// The system's: also that there is no room for all of it.
@@ -90,7 +89,6 @@ impl RingWriter {
         let mut options = OpenOptions::new();
         let options = options.read(true).write(true).create_new(true).mode(0o600);
         let file = options.open(path)?;
-        file.lock()?;
         let capacity = (bytes / PAGE).max(2) * PAGE;
         vigil_cycle::reserve(&file, PAGE + capacity)?;
         for (place, value) in [MAGIC, capacity, 0, 0].into_iter().enumerate() {

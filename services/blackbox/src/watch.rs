@@ -28,7 +28,7 @@ const AFTER_MAX: u64 = 6;
 /// Keeps and writes until it is asked to stop, or no service is left.
 pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     signal::install();
-    memory::demand_free(&running.domain)?;
+    let _lock = memory::lock(&running.domain)?;
     let folder = RecordingsFolder::find(&running)?;
     for cut in folder.adopt_parts() {
         say(&format!("{} was cut short", cut.display()));

@@ -127,7 +127,7 @@ impl Companion {
 }
 
 /// Has what was kept by black boxes that were killed written, before the files are gone that say
-/// what happened then. The black box lies in this folder of `programs`; none may live.
+/// what happened then. `programs` is the folder of the binaries; no black box may live.
 pub fn rescue(programs: &Path, domain: &Domain) {
     if !domain.has_memory() {
         return;

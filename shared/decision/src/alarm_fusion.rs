@@ -5,7 +5,7 @@ use vigil_blocks::{
     Action, CauseKind, DetectionBelief, Entry, FaultBelief, MODE_BLIND, Readiness, RecoveryKind,
 };
 use vigil_checkpoint::Checkpoint;
-use vigil_robot::DetectorSuccession;
+use vigil_robot::DetectorAlarm;
 use vigil_robot::fused_alarm::{FusedAlarm, StageBeliefs};
 
 use crate::inputs::Inputs;
@@ -30,14 +30,17 @@ pub const fn fused_alarm(detection: &DetectionBelief, action: Option<&Action>) -
 }
 
 /// What decisions depend on besides beliefs.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Situation {
     /// The detector is blind: no belief counts.
     pub is_blind: bool,
     /// The fused alarm stands: before it, what has no name counts as nothing.
     pub alarm: bool,
-    /// The detector's probability of a fault.
+    /// The detector's probability of a fault, also after its replacement.
     pub p_fault: f64,
+    /// How probable it is at most that nothing is wrong: beside an alarm of which the identifier
+    /// does not know yet, since it has just begun.
+    pub p_nominal_max: f64,
     /// The robot rests: nothing that it does would show a fault.
     pub rests: bool,
 }
@@ -46,17 +49,16 @@ pub(crate) struct Situation {
 #[derive(Debug, Clone, Checkpoint)]
 pub(crate) struct AlarmFusion {
     alarm: FusedAlarm,
-    succession: DetectorSuccession,
-    /// As in the last detection that counts.
-    detected: bool,
-    detected_t_ns: u64,
-    p_fault: f64,
+    detected: DetectorAlarm,
+    has_begun: bool,
     /// As in the last detection.
     blind: u32,
     readiness: u32,
     run_id: u64,
     t_ns: u64,
     p_nominal: f64,
+    /// The identifier knows of an alarm.
+    is_identifying: bool,
     faults: u32,
     /// Detections since the last diagnosis.
     unanswered: u32,
@@ -68,15 +70,14 @@ impl AlarmFusion {
     pub(crate) fn new(arming_speed_scale: f64) -> Self {
         Self {
             alarm: FusedAlarm::default(),
-            succession: DetectorSuccession::default(),
-            detected: false,
-            detected_t_ns: 0,
-            p_fault: 0.0,
+            detected: DetectorAlarm::default(),
+            has_begun: false,
             blind: 0,
             readiness: Readiness::Arming as u32,
             run_id: 0,
             t_ns: 0,
             p_nominal: 1.0,
+            is_identifying: false,
             faults: 0,
             unanswered: 0,
             arming_speed_scale,
@@ -89,7 +90,7 @@ impl AlarmFusion {
         let Entry::Frame(inputs) = entry else {
             if matches!(entry, Entry::Reset) {
                 self.alarm.reset();
-                self.succession = DetectorSuccession::default();
+                self.detected = DetectorAlarm::default();
                 self.readiness = Readiness::Arming as u32;
                 (self.p_nominal, self.faults, self.unanswered) = (1.0, 0, 0);
             }
@@ -102,7 +103,7 @@ impl AlarmFusion {
             self.take_diagnosis(diagnosis);
         }
         if let Some(detection) = detection {
-            self.fuse(detection, inputs.diagnosis.is_some());
+            self.fuse(detection, inputs.diagnosis);
         }
         match (inputs.diagnosis, detection) {
             (None, None) => Entry::Missed(0),
@@ -116,6 +117,7 @@ impl AlarmFusion {
     fn take_diagnosis(&mut self, diagnosis: &FaultBelief) {
         let p = diagnosis.p[0];
         self.p_nominal = if p.is_finite() { p } else { 0.0 };
+        self.is_identifying = diagnosis.identifying != 0;
         let set = &diagnosis.sets[0];
         let is_named = diagnosis.set_count > 0 && set.p >= REPORTED;
         self.faults = match is_named && diagnosis.mode != MODE_BLIND {
@@ -124,24 +126,22 @@ impl AlarmFusion {
         };
     }
 
-    fn fuse(&mut self, detection: &DetectionBelief, is_answered: bool) {
+    fn fuse(&mut self, detection: &DetectionBelief, diagnosis: Option<&FaultBelief>) {
         if detection.run_id != self.run_id {
             self.alarm.reset();
             self.run_id = detection.run_id;
         }
-        self.unanswered = match is_answered {
-            true => 0,
-            false => self.unanswered.saturating_add(1),
+        self.unanswered = match diagnosis {
+            Some(_) => 0,
+            None => self.unanswered.saturating_add(1),
         };
         let is_lost = self.unanswered >= LOST_AFTER;
         let t_ns = detection.header.t_capture_ns;
         let passed_s = t_ns.saturating_sub(self.t_ns) as f64 * 1e-9;
         (self.t_ns, self.readiness) = (t_ns, detection.readiness);
-        if self.succession.counts(detection) {
-            self.detected = detection.alarm != 0;
-            self.detected_t_ns = detection.alarm_t_capture_ns;
-            let p = detection.p_fault;
-            self.p_fault = if p.is_finite() { p } else { 1.0 };
+        self.detected.take(detection);
+        if let Some(diagnosis) = diagnosis {
+            self.hold(detection, diagnosis);
         }
         self.alarm.take(&StageBeliefs {
             t_ns,
@@ -150,26 +150,52 @@ impl AlarmFusion {
             } else {
                 passed_s.min(STEP_MAX_S)
             },
-            alarm: self.detected,
-            alarm_t_ns: self.detected_t_ns,
-            alarm_count: self.succession.alarm_count(),
-            p_nominal: if is_lost { 0.0 } else { self.p_nominal },
+            alarm: self.detected.stands(),
+            alarm_t_ns: self.detected.t_ns(),
+            alarm_count: self.detected.count(),
+            p_nominal: match is_lost {
+                true => 0.0,
+                false => self.p_nominal.min(self.p_nominal_max()),
+            },
             faults: self.faults,
         });
     }
 
     /// What decisions depend on.
-    pub(crate) const fn situation(&self) -> Situation {
+    pub(crate) fn situation(&self) -> Situation {
         Situation {
             is_blind: self.blind != 0,
             alarm: self.alarm.stands(),
-            p_fault: self.p_fault,
+            p_fault: self.detected.p_fault(),
+            p_nominal_max: self.p_nominal_max(),
             rests: self.rests(),
         }
     }
 
+    fn p_nominal_max(&self) -> f64 {
+        match self.detected.stands() && !self.is_identifying {
+            true => 1.0 - self.detected.p_fault(),
+            false => 1.0,
+        }
+    }
+
+    /// A detector that arms does not say whether the robot moves: while an alarm is held against
+    /// it, nothing counts as shown.
     const fn rests(&self) -> bool {
-        self.readiness == Readiness::NotExcited as u32
+        let arms = self.readiness == Readiness::Arming as u32;
+        self.readiness == Readiness::NotExcited as u32 || arms && self.detected.is_held()
+    }
+
+    /// A supervisor that begins beside a detector that has just begun, too, learns from the
+    /// identifier of an alarm that stood.
+    fn hold(&mut self, detection: &DetectionBelief, diagnosis: &FaultBelief) {
+        let is_first = !std::mem::replace(&mut self.has_begun, true);
+        let knows = diagnosis.alarm_t_capture_ns != 0 && diagnosis.run_id == detection.run_id;
+        let arms = self.readiness == Readiness::Arming as u32 && detection.alarm == 0;
+        if is_first && knows && arms {
+            let p_fault = 1.0 - diagnosis.p[0];
+            self.detected.hold(diagnosis.alarm_t_capture_ns, p_fault);
+        }
     }
 
     /// Writes alarm and blindness into the decision. While the detector arms, the robot goes on
@@ -261,6 +287,50 @@ mod tests {
         assert_eq!(next(5000, Readiness::Armed), (true, 0.75));
         assert_eq!(next(5400, Readiness::Armed), (true, 0.75));
         assert_eq!(next(5600, Readiness::Armed), (false, 0.0));
+    }
+
+    #[test]
+    fn beside_a_detector_that_arms_nothing_shows_that_an_alarm_has_ended() {
+        let mut fusion = AlarmFusion::new(0.5);
+        let mut first = detection(0, 1);
+        (first.header.epoch, first.p_fault) = (1, 0.75);
+        take(&mut fusion, Some(&first), Some(&diagnosis(0.0)));
+        let mut next = |t_ms, readiness| {
+            let mut next = detection(t_ms, 0);
+            (next.header.epoch, next.readiness) = (2, readiness as u32);
+            // An identifier that was replaced, too: it does not know of the alarm.
+            take(&mut fusion, Some(&next), Some(&diagnosis(1.0)));
+            fusion.situation()
+        };
+        for step in 1..100 {
+            let situation = next(100 * step, Readiness::Arming);
+            assert!(situation.alarm && situation.rests);
+            assert_eq!(situation.p_nominal_max, 0.25);
+        }
+        for step in 100..109 {
+            let situation = next(100 * step, Readiness::Armed);
+            assert!(situation.alarm && !situation.rests);
+        }
+        let situation = next(10_900, Readiness::Armed);
+        assert_eq!((situation.alarm, situation.p_nominal_max), (false, 1.0));
+    }
+
+    #[test]
+    fn a_supervisor_that_begins_beside_a_new_detector_learns_of_the_alarm_from_the_identifier() {
+        let mut stands = diagnosis(0.25);
+        stands.alarm_t_capture_ns = 7;
+        let mut arming = detection(100, 0);
+        arming.readiness = Readiness::Arming as u32;
+        let situation = |detection: &DetectionBelief, diagnosis: &FaultBelief| {
+            let mut fusion = AlarmFusion::new(0.5);
+            take(&mut fusion, Some(detection), Some(diagnosis));
+            let Situation { alarm, p_fault, .. } = fusion.situation();
+            (alarm, p_fault, fusion.alarm.t_ns())
+        };
+        assert_eq!(situation(&arming, &stands), (true, 0.75, 7));
+        assert_eq!(situation(&detection(100, 0), &stands), (false, 0.0, 0));
+        stands.run_id = 5;
+        assert_eq!(situation(&arming, &stands), (false, 0.0, 0));
     }
 
     #[test]

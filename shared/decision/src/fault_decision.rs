@@ -15,7 +15,7 @@ use crate::mapping::Compensation;
 use crate::settings::Settings;
 use crate::settling::{Settling, folded};
 use crate::state_belief::{
-    self, MOVED, distance, normalise, position, write_fallback, write_weights,
+    self, MOVED, cap_nominal, distance, normalise, position, write_fallback, write_weights,
 };
 use crate::states::{self, StateMeaning, Subject};
 use crate::switching_cost::SwitchingCost;
@@ -126,6 +126,7 @@ impl FaultDecision {
             weights,
         );
         normalise(weights);
+        cap_nominal(&self.states, situation.p_nominal_max, weights);
         let mut settling = self.settling;
         if timed {
             process.log_evidence = log_score(&folded(&self.states, before), weights);

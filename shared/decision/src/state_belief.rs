@@ -114,6 +114,17 @@ pub(crate) fn normalise(weights: &mut [f64]) {
     weights.iter_mut().for_each(|weight| *weight /= sum);
 }
 
+/// Makes nominal as probable as `p_max` at most; the unknown, where there is one, takes the rest.
+pub(crate) fn cap_nominal(states: &[StateMeaning], p_max: f64, weights: &mut [f64]) {
+    let place = |subject| position(states, subject);
+    let places = (place(Subject::Nominal), place(Subject::Unknown));
+    if let (Some(nominal), Some(unknown)) = places {
+        let excess = (weights[nominal] - p_max).max(0.0);
+        weights[nominal] -= excess;
+        weights[unknown] += excess;
+    }
+}
+
 /// Half the sum of absolute differences.
 pub(crate) fn distance(one: &[f64], other: &[f64]) -> f64 {
     let differences = one.iter().zip(other).map(|(a, b)| (a - b).abs());

@@ -35,7 +35,7 @@ pub struct StageBeliefs {
     pub alarm: bool,
     /// Capture time of the frame that raised the detector's alarm, ns.
     pub alarm_t_ns: u64,
-    /// Alarms that the detector has raised.
+    /// Alarms that the detector has raised, and those before it.
     pub alarm_count: u32,
     /// The identifier's probability that nothing is wrong; 0 without an identifier.
     pub p_nominal: f64,

@@ -107,9 +107,16 @@ fn stop_services(domain: &Domain) -> Result<(), CommandError> {
         }
     }
     // Who holds the lock now has no service alive.
-    if let Some(_lock) = domain.lock().map_err(CommandError::failure)? {
-        let program = std::env::current_exe().map_err(CommandError::failure)?;
-        vigil_launcher::rescue(program.parent().unwrap_or(Path::new(".")), domain);
+    if let Some(lock) = domain.lock().map_err(CommandError::failure)? {
+        // Whoever ends this command: nobody starts the graph while its last seconds are written.
+        lock.share_with_children();
+        if let Some(programs) = std::env::current_exe()
+            .ok()
+            .as_deref()
+            .and_then(Path::parent)
+        {
+            vigil_launcher::rescue(programs, domain);
+        }
         domain.remove_residue();
         EventWriter::remove(&domain.events_file());
     }

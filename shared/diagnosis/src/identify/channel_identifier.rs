@@ -7,7 +7,7 @@ use vigil_blocks::{
 use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_robot::channel_model::belief::{ComponentBelief, PairBelief};
 use vigil_robot::channel_model::{Model, Monitor, Observer, components};
-use vigil_robot::{ChannelMap, Description, DetectorSuccession, FaultTree};
+use vigil_robot::{ChannelMap, Description, DetectorAlarm, FaultTree};
 
 use crate::identify::identifier::Input;
 use crate::identify::leaf_map::{IdentifierError, LeafMap};
@@ -68,10 +68,7 @@ pub struct ChannelIdentifier {
     /// Capture time of the last frame, ns, and motion in it, s, until it has been reported.
     t_ns: u64,
     moved_s: f64,
-    /// The detector's alarm, and its probability of a fault.
-    alarm_t_ns: u64,
-    p_fault: f64,
-    succession: DetectorSuccession,
+    alarm: DetectorAlarm,
 }
 
 impl ChannelIdentifier {
@@ -124,9 +121,7 @@ impl ChannelIdentifier {
             run_id: 0,
             t_ns: 0,
             moved_s: 0.0,
-            alarm_t_ns: 0,
-            p_fault: 0.0,
-            succession: DetectorSuccession::default(),
+            alarm: DetectorAlarm::default(),
         })
     }
 
@@ -177,7 +172,8 @@ impl ChannelIdentifier {
         self.verdict = NO_VERDICT;
         self.posterior = TreeBelief::nominal();
         self.reported.begin_run();
-        (self.t_ns, self.alarm_t_ns) = (0, 0);
+        self.t_ns = 0;
+        self.alarm = DetectorAlarm::default();
     }
 
     /// What the last seconds say of the components.
@@ -212,7 +208,7 @@ impl ChannelIdentifier {
         }
         // The window shows the last seconds alone: a fault that stands began before.
         let before = &self.verdict;
-        if self.alarm_t_ns != 0 && before.likeliest == verdict.likeliest && before.onset_ns != 0 {
+        if self.alarm.stands() && before.likeliest == verdict.likeliest && before.onset_ns != 0 {
             verdict.onset_ns = verdict.onset_ns.min(before.onset_ns);
         }
         verdict.unknown = (1.0 - named).clamp(0.0, 1.0);
@@ -230,16 +226,10 @@ impl ChannelIdentifier {
     fn take(&mut self, detection: &DetectionBelief, dt_s: f64) {
         let moves = detection.readiness == Readiness::Armed as u32 && self.t_ns != 0;
         self.moved_s = if moves { dt_s } else { 0.0 };
-        if self.succession.counts(detection) {
-            self.alarm_t_ns = match detection.alarm {
-                0 => 0,
-                _ => detection.alarm_t_capture_ns,
-            };
-            self.p_fault = detection.p_fault;
-        }
-        let mut belief = TreeBelief::watching(self.p_fault);
+        self.alarm.take(detection);
+        let mut belief = TreeBelief::watching(self.alarm.p_fault());
         let p_fault = belief.unknown;
-        if self.alarm_t_ns == 0 {
+        if !self.alarm.stands() {
             self.posterior = belief;
             return;
         }
@@ -272,7 +262,7 @@ impl ChannelIdentifier {
     /// counted where they are seen, by [`crate::identify::blind_override`].
     fn report(&mut self, predicted: &TreeBelief, belief: &mut FaultBelief) {
         let posterior = &self.posterior;
-        let alarm = self.alarm_t_ns != 0;
+        let alarm = self.alarm.stands();
         let (mode, p_mode) = match alarm {
             true => posterior.mode(&self.leaves),
             false => (0, posterior.nodes[0]),
@@ -287,7 +277,7 @@ impl ChannelIdentifier {
         belief.mode = mode;
         belief.reported = self.reported.name();
         belief.p_mode = p_mode;
-        belief.alarm_t_capture_ns = self.alarm_t_ns;
+        belief.alarm_t_capture_ns = if alarm { self.alarm.t_ns() } else { 0 };
         belief.identifying = u32::from(alarm);
         if alarm {
             let verdict = &self.verdict;

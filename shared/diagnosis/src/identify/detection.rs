@@ -3,35 +3,38 @@
 use vigil_blocks::DetectionBelief;
 use vigil_checkpoint::CheckpointValue;
 use vigil_robot::learned::{NoiseScales, OutlierRates};
-use vigil_robot::{ChannelMap, DetectorSuccession, Suspects};
+use vigil_robot::{ChannelMap, DetectorAlarm, Suspects};
 
 /// The last detection that counts.
 #[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 pub struct Detection {
-    /// Whether the alarm stands.
-    pub alarm: bool,
-    /// Since when, capture time ns.
-    pub t_ns: u64,
+    /// The detector's alarm.
+    pub alarm: DetectorAlarm,
     /// The channels in which a fault is suspected.
     pub suspects: Suspects,
-    /// Probability of a fault.
-    pub p_fault: f64,
     /// How noisy the sensors are.
     pub noise: NoiseScales,
-    succession: DetectorSuccession,
     has_begun: bool,
-    /// The alarm stood already at the first detection of the run.
-    missed_onset: bool,
+    /// Motion that an identifier which has begun beside an alarm lacks to know as much as another
+    /// one, s.
+    unseen_s: f64,
 }
 
 impl Detection {
-    /// Takes the next belief, unless the alarm of a detector before stands. Scales and rates beyond
-    /// what a detector reports are those of a good sensor. Chosen: a scale of 0.1 and less or 100
-    /// and more, a rate of a half and more.
-    pub fn take(&mut self, belief: &DetectionBelief, map: &ChannelMap) {
-        if !self.succession.counts(belief) {
+    /// Takes the next belief, unless an alarm is held against it. An identification knows `ring_s`
+    /// of motion from before its alarm. Scales and rates beyond what a detector reports are those
+    /// of a good sensor. Chosen: a scale of 0.1 and less or 100 and more, a rate of a half and
+    /// more.
+    pub fn take(&mut self, belief: &DetectionBelief, map: &ChannelMap, ring_s: f64) {
+        let is_first = !std::mem::replace(&mut self.has_begun, true);
+        if !self.alarm.take(belief) {
             return;
         }
+        self.unseen_s = match (self.alarm.stands(), is_first) {
+            (false, _) => 0.0,
+            (true, true) => ring_s,
+            (true, false) => self.unseen_s,
+        };
         let scale = |scale: f64| match scale > 0.1 && scale < 100.0 {
             true => scale,
             false => 1.0,
@@ -40,35 +43,30 @@ impl Detection {
             true => rate,
             false => OutlierRates::default().pose[0],
         };
-        let alarm = belief.alarm != 0;
-        let is_first = !self.has_begun;
         let channels = map.from_evidence(&belief.channel_log_odds, f64::NEG_INFINITY);
-        *self = Self {
-            alarm,
-            suspects: Suspects::new(alarm, &channels),
-            t_ns: belief.alarm_t_capture_ns,
-            p_fault: belief.p_fault,
-            noise: NoiseScales {
-                pose: belief.noise_scale.map(scale),
-                wheels: belief.noise_scale_wheels.map(scale),
-                steer: belief.noise_scale_steer.map(scale),
-                outliers: OutlierRates {
-                    pose: belief.outlier_rate.map(rate),
-                    wheels: belief.outlier_rate_wheels.map(rate),
-                    steer: belief.outlier_rate_steer.map(rate),
-                },
+        self.suspects = Suspects::new(self.alarm.stands(), &channels);
+        self.noise = NoiseScales {
+            pose: belief.noise_scale.map(scale),
+            wheels: belief.noise_scale_wheels.map(scale),
+            steer: belief.noise_scale_steer.map(scale),
+            outliers: OutlierRates {
+                pose: belief.outlier_rate.map(rate),
+                wheels: belief.outlier_rate_wheels.map(rate),
+                steer: belief.outlier_rate_steer.map(rate),
             },
-            succession: self.succession,
-            has_begun: true,
-            missed_onset: alarm && (is_first || self.missed_onset),
         };
     }
 
+    /// So much motion was observed.
+    pub const fn pass(&mut self, moved_s: f64) {
+        self.unseen_s = (self.unseen_s - moved_s).max(0.0);
+    }
+
     /// How probable it is at most that nothing is wrong: who has not seen how an alarm began
-    /// believes the detector.
+    /// believes the detector, until it has seen enough itself.
     pub fn p_nominal_max(&self) -> f64 {
-        match self.missed_onset {
-            true => 1.0 - self.p_fault.clamp(0.0, 1.0),
+        match self.unseen_s > 0.0 {
+            true => 1.0 - self.alarm.p_fault(),
             false => 1.0,
         }
     }
@@ -80,7 +78,7 @@ mod tests {
 
     fn detection(belief: &DetectionBelief) -> Detection {
         let mut detection = Detection::default();
-        detection.take(belief, &map());
+        detection.take(belief, &map(), 2.0);
         detection
     }
 
@@ -129,12 +127,16 @@ mod tests {
             ..DetectionBelief::default()
         };
         let found = detection(&belief);
-        assert_eq!((found.alarm, found.t_ns, found.p_fault), (true, 7, 0.3));
-        assert!(!detection(&DetectionBelief::default()).alarm);
+        let alarm = found.alarm;
+        assert_eq!(
+            (alarm.stands(), alarm.t_ns(), alarm.p_fault()),
+            (true, 7, 0.3)
+        );
+        assert!(!detection(&DetectionBelief::default()).alarm.stands());
     }
 
     #[test]
-    fn who_begins_beside_an_alarm_believes_the_detector_until_it_falls() {
+    fn who_begins_beside_an_alarm_believes_the_detector_until_it_has_seen_as_much() {
         let map = map();
         let belief = |alarm, p_fault| DetectionBelief {
             alarm,
@@ -143,15 +145,21 @@ mod tests {
         };
         let mut found = Detection::default();
         assert_eq!(found.p_nominal_max(), 1.0);
-        for (alarm, p_fault, p_max) in [
-            (1, 0.75, 0.25),
-            (1, f64::INFINITY, 0.0),
-            (0, 0.5, 1.0),
-            (1, 0.75, 1.0),
+        for (alarm, p_fault, moved_s, p_max) in [
+            (1, 0.75, 0.0, 0.25),
+            (1, f64::NAN, 1.5, 0.0),
+            (1, 0.5, 0.5, 1.0),
+            (0, 0.5, 0.0, 1.0),
+            (1, 0.75, 0.0, 1.0),
         ] {
-            found.take(&belief(alarm, p_fault), &map);
+            found.take(&belief(alarm, p_fault), &map, 2.0);
+            found.pass(moved_s);
             assert_eq!(found.p_nominal_max(), p_max);
         }
+        found = Detection::default();
+        found.take(&belief(1, 0.75), &map, 2.0);
+        found.take(&belief(0, 0.0), &map, 2.0);
+        assert_eq!(found.p_nominal_max(), 1.0, "it has fallen");
     }
 
     #[test]
@@ -164,13 +172,15 @@ mod tests {
             ..DetectionBelief::default()
         };
         belief.header.epoch = 1;
-        found.take(&belief, &map);
+        belief.noise_scale[0] = 3.0;
+        found.take(&belief, &map, 2.0);
         let mut fresh = DetectionBelief::default();
         fresh.header.epoch = 2;
-        found.take(&fresh, &map);
-        assert_eq!((found.alarm, found.p_fault), (true, 0.9));
+        found.take(&fresh, &map, 2.0);
+        assert!(found.alarm.is_held());
+        assert_eq!((found.alarm.p_fault(), found.noise.pose[0]), (0.9, 3.0));
         fresh.run_id = 5;
-        found.take(&fresh, &map);
-        assert!(!found.alarm);
+        found.take(&fresh, &map, 2.0);
+        assert!(!found.alarm.stands());
     }
 }

@@ -238,19 +238,21 @@ impl Identifier {
     }
 
     fn take(&mut self, input: &Input<'_>) {
-        self.observer.suspect(self.detection.alarm);
+        self.observer.suspect(self.detection.alarm.stands());
         let intake = self.observer.push(input.frame);
         if intake.new_run {
             self.begin_run();
         }
         self.run_id = input.frame.run_id;
         if let Some((belief, _)) = input.detection {
-            self.detection.take(belief, self.evidence.map());
+            let ring_s = self.ring.capacity() as f64 * self.interval_s;
+            self.detection.take(belief, self.evidence.map(), ring_s);
         }
         if intake.complete {
             self.in_trouble = self.observer.observation().troubles.any(self.use_wheels);
             self.keep(input);
             self.moved_s += self.observer.observation().moved_s();
+            self.detection.pass(self.observer.observation().moved_s());
         }
         if self.in_trouble {
             self.phase = Phase::Watching;
@@ -259,21 +261,20 @@ impl Identifier {
             self.evidence.clear();
             return;
         }
-        if !self.detection.alarm {
+        if !self.detection.alarm.stands() {
             // The detector decides whether there is a fault: none is named without its alarm.
             self.phase = Phase::Watching;
         }
         match self.phase {
-            Phase::Watching if self.detection.alarm => self.begin(),
+            Phase::Watching if self.detection.alarm.stands() => self.begin(),
             Phase::Watching => {
-                self.posterior = TreeBelief::watching(self.detection.p_fault);
+                self.posterior = TreeBelief::watching(self.detection.alarm.p_fault());
                 self.evidence.clear();
             }
             Phase::Identifying(_) => {}
         }
         if let Phase::Identifying(next) = self.phase {
             self.identify(next, intake.complete);
-            self.posterior.cap_nominal(self.detection.p_nominal_max());
         }
     }
 
@@ -323,6 +324,9 @@ impl Identifier {
         }
         self.phase = Phase::Identifying(start + 1);
         self.sizes = NodeSizes::default();
+        for belief in [&mut self.posterior, &mut self.predicted] {
+            belief.cap_nominal(self.detection.p_nominal_max());
+        }
         // What was unknown so far is any of the faults, by their priors.
         self.predicted = self.predicted.divided(&self.leaves, self.p_unknown);
     }
@@ -359,6 +363,7 @@ impl Identifier {
         let fusion = self.further.as_ref().map(|further| further.fusion());
         self.engine
             .posterior(&self.leaves, fusion.as_ref(), &mut self.posterior);
+        self.posterior.cap_nominal(self.detection.p_nominal_max());
         self.sizes = self.engine.sizes(&self.leaves, &self.posterior);
         self.explain(next, next + taken);
         self.updated = true;
@@ -445,10 +450,8 @@ impl Identifier {
         belief.mode = mode;
         belief.p_mode = p_mode;
         belief.mode_change_count = self.mode_changes;
-        belief.alarm_t_capture_ns = match self.detection.alarm {
-            true => self.detection.t_ns,
-            false => 0,
-        };
+        let alarm = &self.detection.alarm;
+        belief.alarm_t_capture_ns = if alarm.stands() { alarm.t_ns() } else { 0 };
         belief.onset_t_capture_ns = self.onset();
         belief.identifying = u32::from(self.phase != Phase::Watching || self.in_trouble);
         belief.runner_up = self.evidence.runner_up();
