@@ -463,6 +463,13 @@ mod tests {
         assert_eq!(Domain::running(&graph), Some(domain.clone()));
         assert!(Domain::all_running().contains(&graph));
         drop(lock);
+        // A child that another test starts holds the lock, too, until it has become its program.
+        for _ in 0..100 {
+            if Domain::running(&graph).is_none() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
         assert_eq!(Domain::running(&graph), None);
 
         domain.remove_residue();
