@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::rc::Rc;
 
 use vigil_blocks::datagram::{self, DATAGRAM_SIZE};
-use vigil_blocks::{Cause, Rejection, SensorFrame};
+use vigil_blocks::{Cause, Rejection, SensorFrame, fnv1a};
 use vigil_cycle::datagrams::{Datagrams, From};
 use vigil_cycle::input::SILENT_NS;
 use vigil_cycle::port::EventListener;
@@ -22,8 +22,8 @@ use crate::arrival_clock::{ArrivalBatch, ArrivalClock};
 /// Datagrams that one turn takes at most: a flood must not hold it. At the
 /// highest rate, a turn of 6 ms of them.
 const TURN_MAX: usize = 64;
-/// Starts of the source are counted in the bits of `run_id` from this one on.
-const START_SHIFT: u32 = 48;
+/// Starts of the source are told apart in the bits of `run_id` from this one on.
+const START_SHIFT: u32 = 16;
 
 /// Where datagrams are to arrive.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -62,9 +62,6 @@ pub struct SocketStage {
     clock: ArrivalClock,
     source: Option<From>,
     taken_ns: u64,
-    /// Epoch of the source, and how often it has changed.
-    epoch: u64,
-    starts: u64,
     /// Frames that arrived in this turn.
     arrived: Vec<(SensorFrame, From)>,
     /// Datagrams of other sources that waited in the kernel and were dropped unread.
@@ -93,8 +90,6 @@ impl SocketStage {
             clock: ArrivalClock::default(),
             source: None,
             taken_ns: 0,
-            epoch: 0,
-            starts: 0,
             arrived: Vec::with_capacity(TURN_MAX),
             unread: 0,
             waiting: Vec::with_capacity(TURN_MAX),
@@ -166,10 +161,9 @@ impl Stage for SocketStage {
                 self.choose(from);
             }
             self.taken_ns = now_ns;
-            self.starts += u64::from(frame.header.epoch != self.epoch);
-            self.epoch = frame.header.epoch;
-            // Readers see this service's epoch, so a new start of the source must change the run.
-            frame.run_id ^= self.starts << START_SHIFT;
+            // Readers see this service's epoch: a new start of the source must change the run, and
+            // one of this service must not.
+            frame.run_id ^= fnv1a::hash_u64(fnv1a::BASIS, frame.header.epoch) << START_SHIFT;
             self.waiting.push(frame);
             intake.stepped(&frame.header, frame.header.id());
         }
