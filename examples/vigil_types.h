@@ -76,6 +76,7 @@
 #define VIGIL_SIZE_SPEED_SHARE_ADDED 23u
 #define VIGIL_CAUSE_FRAME 1u
 #define VIGIL_CAUSE_MISSED 2u
+#define VIGIL_IDENTIFYING_CATCHING_UP 2u
 #define VIGIL_DATAGRAM_SIZE 592u
 #define VIGIL_VERDICT_DATAGRAM_SIZE 304u
 
@@ -274,6 +275,31 @@ VIGIL_ASSERT(offsetof(vigil_fault_record, action) == 560);
 VIGIL_ASSERT(offsetof(vigil_fault_record, command_valid) == 564);
 VIGIL_ASSERT(offsetof(vigil_fault_record, latches) == 568);
 VIGIL_ASSERT(offsetof(vigil_fault_record, reserved) == 572);
+
+typedef struct {
+  /* The run. */
+  uint64_t run_id;
+  /* Capture time of the frame that raised the detector's alarm, ns; 0 while none stands. */
+  uint64_t detected_t_capture_ns;
+  /* The detector's probability of a fault. */
+  double p_fault;
+  /* See Action::alarm_t_capture_ns. */
+  uint64_t alarm_t_capture_ns;
+  /* Hash of the decision model. */
+  uint64_t model_hash;
+  /* See Action::alarm_count. */
+  uint32_t alarm_count;
+  /* 1 + the action of the decision model that stands until a new run, whatever is believed; 0 without one. */
+  uint32_t latched;
+} vigil_carryover;
+VIGIL_ASSERT(sizeof(vigil_carryover) == 48);
+VIGIL_ASSERT(offsetof(vigil_carryover, run_id) == 0);
+VIGIL_ASSERT(offsetof(vigil_carryover, detected_t_capture_ns) == 8);
+VIGIL_ASSERT(offsetof(vigil_carryover, p_fault) == 16);
+VIGIL_ASSERT(offsetof(vigil_carryover, alarm_t_capture_ns) == 24);
+VIGIL_ASSERT(offsetof(vigil_carryover, model_hash) == 32);
+VIGIL_ASSERT(offsetof(vigil_carryover, alarm_count) == 40);
+VIGIL_ASSERT(offsetof(vigil_carryover, latched) == 44);
 
 #define VIGIL_SENSOR_FRAME_SCHEMA 0xe54ee7c97147decdull
 #define VIGIL_SENSOR_FRAME_TYPE_NAME "vigil.SensorFrame.v1.e54ee7c97147decd"
@@ -485,7 +511,7 @@ typedef struct {
   uint32_t node_count;
   /* Sets in use. */
   uint32_t set_count;
-  /* 1 while identifying (an alarm stands or a fault is believed), 0 while watching. */
+  /* 1 while identifying (an alarm stands or a fault is believed), CATCHING_UP before the first result of that; 0 while watching, or while nothing is known yet of an alarm that stood before the identifier began. */
   uint32_t identifying;
   /* Steps that met impossible or non-finite evidence and kept the prediction. */
   uint32_t degenerate_count;
@@ -668,8 +694,8 @@ VIGIL_ASSERT(offsetof(vigil_truth, touches) == 140);
 VIGIL_ASSERT(offsetof(vigil_truth, at_goal) == 144);
 VIGIL_ASSERT(offsetof(vigil_truth, reserved) == 148);
 
-#define VIGIL_FAULTS_SCHEMA 0x2ee305d770a7813dull
-#define VIGIL_FAULTS_TYPE_NAME "vigil.Faults.v1.2ee305d770a7813d"
+#define VIGIL_FAULTS_SCHEMA 0x1c29bb227971e917ull
+#define VIGIL_FAULTS_TYPE_NAME "vigil.Faults.v1.1c29bb227971e917"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -683,17 +709,20 @@ typedef struct {
   uint32_t dropped_count;
   /* The overall state: an OverallState. */
   uint32_t overall;
+  /* What the next supervisor goes on from. */
+  vigil_carryover carryover;
   /* The faults, in no order. */
   vigil_fault_record records[16];
 } vigil_faults;
-VIGIL_ASSERT(sizeof(vigil_faults) == 9296);
+VIGIL_ASSERT(sizeof(vigil_faults) == 9344);
 VIGIL_ASSERT(offsetof(vigil_faults, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_faults, tree_hash) == 48);
 VIGIL_ASSERT(offsetof(vigil_faults, revision) == 56);
 VIGIL_ASSERT(offsetof(vigil_faults, fault_count) == 64);
 VIGIL_ASSERT(offsetof(vigil_faults, dropped_count) == 72);
 VIGIL_ASSERT(offsetof(vigil_faults, overall) == 76);
-VIGIL_ASSERT(offsetof(vigil_faults, records) == 80);
+VIGIL_ASSERT(offsetof(vigil_faults, carryover) == 80);
+VIGIL_ASSERT(offsetof(vigil_faults, records) == 128);
 
 #define VIGIL_HEALTH_SCHEMA 0x22ca8e52d533df67ull
 #define VIGIL_HEALTH_TYPE_NAME "vigil.Health.v1.22ca8e52d533df67"

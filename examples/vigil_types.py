@@ -66,6 +66,7 @@ SIZE_GRIP_SHARE_LOST = 22
 SIZE_SPEED_SHARE_ADDED = 23
 CAUSE_FRAME = 1
 CAUSE_MISSED = 2
+IDENTIFYING_CATCHING_UP = 2
 
 
 class Header(ctypes.LittleEndianStructure):
@@ -290,6 +291,35 @@ assert FaultRecord.action.offset == 560
 assert FaultRecord.command_valid.offset == 564
 assert FaultRecord.latches.offset == 568
 assert FaultRecord.reserved.offset == 572
+
+
+class Carryover(ctypes.LittleEndianStructure):
+    _fields_ = [
+        # The run.
+        ("run_id", ctypes.c_uint64),
+        # Capture time of the frame that raised the detector's alarm, ns; 0 while none stands.
+        ("detected_t_capture_ns", ctypes.c_uint64),
+        # The detector's probability of a fault.
+        ("p_fault", ctypes.c_double),
+        # See Action::alarm_t_capture_ns.
+        ("alarm_t_capture_ns", ctypes.c_uint64),
+        # Hash of the decision model.
+        ("model_hash", ctypes.c_uint64),
+        # See Action::alarm_count.
+        ("alarm_count", ctypes.c_uint32),
+        # 1 + the action of the decision model that stands until a new run, whatever is believed; 0 without one.
+        ("latched", ctypes.c_uint32),
+    ]
+
+
+assert ctypes.sizeof(Carryover) == 48
+assert Carryover.run_id.offset == 0
+assert Carryover.detected_t_capture_ns.offset == 8
+assert Carryover.p_fault.offset == 16
+assert Carryover.alarm_t_capture_ns.offset == 24
+assert Carryover.model_hash.offset == 32
+assert Carryover.alarm_count.offset == 40
+assert Carryover.latched.offset == 44
 
 
 class SensorFrame(ctypes.LittleEndianStructure):
@@ -535,7 +565,7 @@ class FaultBelief(ctypes.LittleEndianStructure):
         ("node_count", ctypes.c_uint32),
         # Sets in use.
         ("set_count", ctypes.c_uint32),
-        # 1 while identifying (an alarm stands or a fault is believed), 0 while watching.
+        # 1 while identifying (an alarm stands or a fault is believed), CATCHING_UP before the first result of that; 0 while watching, or while nothing is known yet of an alarm that stood before the identifier began.
         ("identifying", ctypes.c_uint32),
         # Steps that met impossible or non-finite evidence and kept the prediction.
         ("degenerate_count", ctypes.c_uint32),
@@ -740,8 +770,8 @@ assert Truth.reserved.offset == 148
 
 
 class Faults(ctypes.LittleEndianStructure):
-    SCHEMA = 0x2EE305D770A7813D
-    TYPE_NAME = "vigil.Faults.v1.2ee305d770a7813d"
+    SCHEMA = 0x1C29BB227971E917
+    TYPE_NAME = "vigil.Faults.v1.1c29bb227971e917"
 
     @staticmethod
     def type_name():
@@ -760,19 +790,22 @@ class Faults(ctypes.LittleEndianStructure):
         ("dropped_count", ctypes.c_uint32),
         # The overall state: an OverallState.
         ("overall", ctypes.c_uint32),
+        # What the next supervisor goes on from.
+        ("carryover", Carryover),
         # The faults, in no order.
         ("records", FaultRecord * 16),
     ]
 
 
-assert ctypes.sizeof(Faults) == 9296
+assert ctypes.sizeof(Faults) == 9344
 assert Faults.header.offset == 0
 assert Faults.tree_hash.offset == 48
 assert Faults.revision.offset == 56
 assert Faults.fault_count.offset == 64
 assert Faults.dropped_count.offset == 72
 assert Faults.overall.offset == 76
-assert Faults.records.offset == 80
+assert Faults.carryover.offset == 80
+assert Faults.records.offset == 128
 
 
 class Health(ctypes.LittleEndianStructure):

@@ -2,11 +2,11 @@
 
 use std::process::Command;
 
-use vigil_blocks::{DetectionBelief, FaultBelief};
+use vigil_blocks::{Action, FaultBelief, RecoveryKind};
 use vigil_cycle::Topic;
 
 use crate::harness::{
-    HealthWatch, ModeWatch, RunningGraph, config_with, drain, eventually, machine, unique,
+    HealthWatch, ModeWatch, RunningGraph, Summary, config_with, drain, eventually, machine, unique,
 };
 
 #[test]
@@ -52,51 +52,108 @@ fn a_restarted_simulator_goes_on_with_its_broken_rover() {
     assert_eq!(injected, ["encoder:LF:zero", "encoder:LF:zero"]);
 }
 
+/// Kills these services at once, and waits until each works again.
+fn replace(health: &mut HealthWatch, services: &[&str]) {
+    eventually("all services run", || health.all_running().then_some(()));
+    let before = health.poll().clone();
+    services.iter().for_each(|name| kill(before[*name].pid));
+    eventually("they are restarted and work", || {
+        let now = health.poll();
+        let works = |name: &&str| {
+            let is_new = now[*name].header.epoch != before[*name].header.epoch;
+            is_new && now[*name].cycles > 50
+        };
+        services.iter().all(works).then_some(())
+    });
+}
+
+/// What was decided in this summary since the first action that is not to go on.
+fn decided_since(summary: &Summary) -> Vec<String> {
+    let actions = summary.events("action").into_iter().map(|event| event.1);
+    let since = actions.skip_while(|action| action == "go_on");
+    since.collect()
+}
+
 #[test]
-fn while_a_service_is_replaced_nobody_drives_on_with_a_stuck_wheel() {
+fn while_services_are_replaced_nobody_drives_on_with_a_stuck_wheel_nor_calls_for_help() {
     let _machine = machine();
-    let options = ["--duration", "60", "--inject", "stuck:RM@2"];
+    let options = ["--duration", "90", "--inject", "stuck:RM@2"];
     let mut graph = RunningGraph::start("replaced", &options);
     let observed = graph.observe();
     let mut health = HealthWatch::new(&observed);
-    let mut seen = ModeWatch::new(&observed, &graph.setup);
-    eventually("RM_STUCK is named", || {
-        seen.poll().filter(|mode| mode == "RM_STUCK")
-    });
-    // Each alone; then another while the new detector arms. The robot drives on, and it does arm.
-    let mut replace = |service: &str| {
-        eventually("all services run", || health.all_running().then_some(()));
-        let before = health.poll()[service];
-        kill(before.pid);
-        eventually("it is restarted and works", || {
-            let now = health.poll()[service];
-            (now.header.epoch != before.header.epoch && now.cycles > 50).then_some(())
+    let mut actions = observed.receiver::<Action>(Topic::Action).unwrap();
+    // The robot drives: a detector that was replaced arms, and raises its own alarm.
+    let mut compensates = |for_ns: u64| {
+        let mut since_ns = None;
+        eventually("the stuck wheel is compensated", || {
+            let mut is_done = None;
+            drain(actions.as_mut(), |action| {
+                let now_ns = action.header.t_publish_ns;
+                let is_compensated = action.kind == RecoveryKind::Compensate as u32;
+                since_ns = is_compensated.then(|| since_ns.unwrap_or(now_ns));
+                let passed_ns = since_ns.map_or(0, |since_ns| now_ns - since_ns);
+                is_done = (passed_ns > for_ns).then_some(());
+            });
+            is_done
         });
     };
-    replace("identifier");
-    replace("supervisor");
-    replace("detector");
-    replace("supervisor");
-    let mut detections = observed
-        .receiver::<DetectionBelief>(Topic::Detection)
-        .unwrap();
-    eventually("the new detector raises its alarm", || {
-        let mut raised = None;
-        drain(detections.as_mut(), |belief| {
-            raised = (belief.alarm != 0).then_some(());
-        });
-        raised
-    });
-    replace("detector");
-    replace("identifier");
+    compensates(500_000_000);
+    for services in [
+        &["supervisor"][..],
+        &["detector"],
+        &["identifier", "supervisor"],
+        &["detector", "identifier"],
+        &["detector", "identifier", "supervisor"],
+    ] {
+        replace(&mut health, services);
+        compensates(4_000_000_000);
+    }
     graph.interrupt();
-    let actions = graph.finish().events("action");
-    let since = actions.iter().skip_while(|action| action.1 == "go_on");
-    let since: Vec<&str> = since.map(|action| action.1.as_str()).collect();
+    let summary = graph.finish();
+    let since = decided_since(&summary);
     assert!(
-        !since.is_empty() && !since.contains(&"go_on"),
-        "{actions:?}"
+        !since.is_empty() && !since.contains(&"go_on".to_owned()),
+        "{since:?}"
     );
+    assert!(summary.events("latched").is_empty(), "{since:?}");
+    let told = summary.events("fault").into_iter().map(|event| event.1);
+    let told: Vec<String> = told.filter(|what| what.contains("STUCK")).collect();
+    assert_eq!(told, ["RM_STUCK is active"]);
+}
+
+#[test]
+fn a_call_for_help_stands_while_services_are_replaced_and_is_told_once() {
+    let _machine = machine();
+    let faults = ["--inject", "stuck:RM@2", "--inject", "stuck:RF@3"];
+    let mut graph = RunningGraph::start("called", &[&["--duration", "90"][..], &faults].concat());
+    let observed = graph.observe();
+    let mut health = HealthWatch::new(&observed);
+    let mut actions = observed.receiver::<Action>(Topic::Action).unwrap();
+    let mut calls = || {
+        eventually("help is called", || {
+            let mut calls = None;
+            drain(actions.as_mut(), |action| {
+                let is_called = action.kind == RecoveryKind::CallForHelp as u32;
+                calls = is_called.then_some(());
+            });
+            calls
+        });
+    };
+    calls();
+    for services in [
+        &["supervisor"][..],
+        &["supervisor", "detector", "identifier"],
+    ] {
+        replace(&mut health, services);
+        calls();
+    }
+    graph.interrupt();
+    let summary = graph.finish();
+    let since = decided_since(&summary);
+    assert!(!since.contains(&"go_on".to_owned()), "{since:?}");
+    assert_eq!(since.last().map(String::as_str), Some("call_for_help"));
+    assert_eq!(summary.events("latched").len(), 1);
+    assert!(summary.events("released").is_empty());
 }
 
 pub fn kill(pid: u32) {

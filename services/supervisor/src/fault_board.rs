@@ -1,8 +1,8 @@
 //! The faults' life at its ports: frames, decisions and operators' orders in, the block out.
 
 use vigil_blocks::{
-    Block, BlockId, Control, EventKind, FaultRecord, Faults, Health, JournalEntry, JournalKind,
-    SensorFrame,
+    Block, BlockId, Carryover, Control, EventKind, FaultRecord, Faults, Health, JournalEntry,
+    JournalKind, SensorFrame,
 };
 use vigil_cycle::health::HEALTH_PERIOD_NS;
 use vigil_cycle::{
@@ -10,7 +10,7 @@ use vigil_cycle::{
     topic::ServiceName,
 };
 
-use crate::steps::FaultStep;
+use crate::steps::{FaultStep, Steps};
 
 /// Longest time between two blocks, ns: a reader takes the supervisor for gone after a few.
 const INTERVAL_NS: u64 = 100_000_000;
@@ -27,6 +27,8 @@ pub struct FaultBoard {
     kept: Option<KeptBlock<Faults>>,
     published_ns: Option<u64>,
     revision_published: u64,
+    /// As it was kept last.
+    carryover: Carryover,
     /// Why they could not be published, until the stage can say so.
     failed: Option<PortError>,
 }
@@ -70,13 +72,13 @@ impl Clock for Instant {
 }
 
 impl FaultBoard {
-    /// Opens the ports on `graph`. What another has left in `kept` goes on in `step`; it is
+    /// Opens the ports on `graph`. What another has left in `kept` goes on in `steps`; it is
     /// published again, and noted in the `journal`.
     ///
     /// # Errors
     /// The transport's.
     pub fn new(
-        step: &mut FaultStep,
+        steps: &mut Steps,
         journal: &mut JournalWriter,
         graph: &Graph,
         kept: Option<KeptBlock<Faults>>,
@@ -85,7 +87,7 @@ impl FaultBoard {
         use ServiceName::{Detector, Identifier, SensorSim, Supervisor};
         let peer = |service| PeerHealth::new(service, graph);
         let left = kept.as_ref().and_then(KeptBlock::read);
-        let is_restored = left.is_some_and(|left| step.restore(&left));
+        let is_restored = left.is_some_and(|left| steps.restore(&left));
         let mut board = Self {
             frames: graph.receiver(Topic::Sensor)?,
             orders: graph.receiver(Topic::Control(Supervisor))?,
@@ -95,9 +97,10 @@ impl FaultBoard {
             failed: None,
             published_ns: None,
             revision_published: 0,
+            carryover: Carryover::default(),
         };
         if is_restored {
-            let left = board.send(step, clock.now_ns())?;
+            let left = board.send(steps, clock.now_ns())?;
             journal.note(JournalEntry::new(JournalKind::Restored, 1).with_input(left));
         }
         Ok(board)
@@ -107,11 +110,12 @@ impl FaultBoard {
     /// told by [`Self::failure`].
     pub(crate) fn turn(
         &mut self,
-        step: &mut FaultStep,
+        steps: &mut Steps,
         journal: &mut JournalWriter,
         health: &mut HealthBoard,
         now_ns: u64,
     ) {
+        let step = &mut steps.faults;
         for _ in 0..self.frames.buffer() {
             let Some(frame) = self.frames.take_next() else {
                 break;
@@ -132,7 +136,7 @@ impl FaultBoard {
             let (what, value) = event(record);
             health.event(now_ns, EventKind::Fault, what, record.p, value);
         }
-        self.failed = self.publish(step, journal, now_ns).err();
+        self.failed = self.publish(steps, journal, now_ns).err();
     }
 
     /// Why the last block could not be published, once.
@@ -169,36 +173,47 @@ impl FaultBoard {
 
     fn publish(
         &mut self,
-        step: &FaultStep,
+        steps: &Steps,
         journal: &mut JournalWriter,
         now_ns: u64,
     ) -> Result<(), PortError> {
-        let is_changed = step.revision() != self.revision_published;
+        let is_changed = self.is_changed(steps);
         let passed_ns = self.published_ns.map(|at_ns| now_ns.saturating_sub(at_ns));
         if !is_changed && passed_ns.is_some_and(|passed_ns| passed_ns < INTERVAL_NS) {
             return Ok(());
         }
-        let id = self.send(step, now_ns)?;
+        let id = self.send(steps, now_ns)?;
         journal.note(JournalEntry::new(JournalKind::Told, 1).with_input(id));
         Ok(())
     }
 
     /// Publishes the faults, and keeps them if they are others than before.
-    fn send(&mut self, step: &FaultStep, now_ns: u64) -> Result<BlockId, PortError> {
+    fn send(&mut self, steps: &Steps, now_ns: u64) -> Result<BlockId, PortError> {
         let (epoch, seq) = (self.faults.epoch(), self.faults.next_seq());
-        let is_changed = step.revision() != self.revision_published;
+        let is_changed = self.is_changed(steps);
         let block = self.faults.block();
-        step.write(block);
-        if let Some(kept) = self.kept.as_mut().filter(|_| is_changed) {
-            kept.write(block);
+        steps.write(block);
+        if is_changed {
+            self.carryover = block.carryover;
+            if let Some(kept) = &mut self.kept {
+                kept.write(block);
+            }
         }
         let stamp = Stamp {
             t_schedule_ns: now_ns,
             t_capture_ns: now_ns,
         };
         self.faults.send(stamp, &Instant(now_ns))?;
-        (self.published_ns, self.revision_published) = (Some(now_ns), step.revision());
+        self.published_ns = Some(now_ns);
+        self.revision_published = steps.faults.revision();
         Ok(BlockId { epoch, seq })
+    }
+
+    /// True if the next supervisor would not go on from the same.
+    fn is_changed(&self, steps: &Steps) -> bool {
+        let carryover = steps.supervisor.carryover();
+        steps.faults.revision() != self.revision_published
+            || carryover.differs_from(&self.carryover)
     }
 }
 

@@ -19,7 +19,24 @@ impl Steps {
     /// Takes a diagnosis, a detection or both, and writes the decision.
     pub fn take(&mut self, inputs: Inputs<'_>, action: &mut Action) {
         self.supervisor.step(Entry::Frame(inputs), action);
-        self.faults.take(inputs);
+        self.faults.take(inputs, self.supervisor.hears_identifier());
+    }
+
+    /// Goes on from what an earlier supervisor has left; false if that is of another fault tree.
+    pub fn restore(&mut self, left: &Faults) -> bool {
+        let is_ours = self.faults.restore(left);
+        if is_ours {
+            let believed = self.faults.diagnosis();
+            self.supervisor
+                .restore(&left.carryover, believed.as_deref());
+        }
+        is_ours
+    }
+
+    /// Writes everything but the header.
+    pub fn write(&self, block: &mut Faults) {
+        self.faults.write(block);
+        block.carryover = self.supervisor.carryover();
     }
 }
 
@@ -52,8 +69,7 @@ impl FaultStep {
         }
     }
 
-    /// Goes on from what an earlier supervisor has left; false if that is of another fault tree.
-    pub fn restore(&mut self, left: &Faults) -> bool {
+    fn restore(&mut self, left: &Faults) -> bool {
         let is_ours = left.tree_hash == self.tree_hash;
         if is_ours {
             self.life.restore(left);
@@ -61,17 +77,23 @@ impl FaultStep {
         is_ours
     }
 
+    /// See [`FaultLife::diagnosis`].
+    fn diagnosis(&self) -> Option<Box<FaultBelief>> {
+        self.life.diagnosis(self.tree_hash)
+    }
+
     /// Keeps a frame, for what is measured when a fault begins.
     pub fn keep(&mut self, frame: &SensorFrame) {
         self.life.see(frame);
     }
 
-    /// Takes what the supervisor takes. A diagnosis of another fault tree is none.
-    pub fn take(&mut self, inputs: Inputs<'_>) {
+    /// Takes what the supervisor takes. A diagnosis of another fault tree is none, nor is that of
+    /// an identifier which is not heard.
+    fn take(&mut self, inputs: Inputs<'_>, is_heard: bool) {
         if let Some(detection) = inputs.detection {
             self.readiness = detection.readiness;
         }
-        let ours = |it: &&FaultBelief| it.tree_hash == self.tree_hash;
+        let ours = |it: &&FaultBelief| is_heard && it.tree_hash == self.tree_hash;
         if let Some(diagnosis) = inputs.diagnosis.filter(ours) {
             *self.diagnosis = *diagnosis;
             self.observes = self.readiness == Readiness::Armed as u32;
@@ -118,8 +140,7 @@ impl FaultStep {
         self.life.revision()
     }
 
-    /// Writes everything but the header.
-    pub fn write(&self, block: &mut Faults) {
+    fn write(&self, block: &mut Faults) {
         self.life.write(block, self.tree_hash);
     }
 }

@@ -79,8 +79,15 @@ impl SupervisorStage {
         clock: &dyn Clock,
     ) -> Result<Self, PortError> {
         let mut journal = JournalWriter::open(graph, ServiceName::Supervisor)?;
-        let board = FaultBoard::new(&mut steps.faults, &mut journal, graph, kept, clock)?;
+        let board = FaultBoard::new(&mut steps, &mut journal, graph, kept, clock)?;
+        // What another has told is not told again.
+        let left = steps.supervisor.carryover();
+        let alarm = AlarmCount {
+            stands: left.alarm_t_capture_ns != 0,
+            count: left.alarm_count,
+        };
         Ok(Self {
+            latched_reported: steps.supervisor.latched(),
             steps,
             diagnoses: graph.receiver(Topic::Diagnosis)?,
             detections: graph.receiver(Topic::Detection)?,
@@ -93,10 +100,9 @@ impl SupervisorStage {
             step: ModelStep::default(),
             steps_reported: 0,
             decision_reported: 0,
-            alarm: AlarmCount::default(),
-            alarm_reported: AlarmCount::default(),
+            alarm,
+            alarm_reported: alarm,
             board,
-            latched_reported: None,
             journal,
         })
     }
@@ -257,8 +263,8 @@ impl Stage for SupervisorStage {
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         health.add_input(&self.detection_account);
         self.report(health, now_ns);
-        let (faults, journal) = (&mut self.steps.faults, &mut self.journal);
-        self.board.turn(faults, journal, health, now_ns);
+        let (steps, journal) = (&mut self.steps, &mut self.journal);
+        self.board.turn(steps, journal, health, now_ns);
         let LastDecision {
             seq,
             action,

@@ -16,6 +16,17 @@ pub const MODE_MULTIPLE: u32 = 1001;
 /// [`FaultBelief::mode`] without valid input for a second.
 pub const MODE_BLIND: u32 = 1002;
 
+/// [`FaultBelief::identifying`] while what was kept from before an alarm is worked off.
+pub const CATCHING_UP: u32 = 2;
+
+impl FaultBelief {
+    /// True before the first result about an alarm.
+    #[must_use]
+    pub const fn is_catching_up(&self) -> bool {
+        self.identifying == CATCHING_UP
+    }
+}
+
 /// The word for a mode that is no node of the fault tree.
 #[must_use]
 pub const fn mode_word(mode: u32) -> Option<&'static str> {
@@ -94,7 +105,9 @@ block! {
         pub node_count: u32,
         /// Sets in use.
         pub set_count: u32,
-        /// 1 while identifying (an alarm stands or a fault is believed), 0 while watching.
+        /// 1 while identifying (an alarm stands or a fault is believed), [`CATCHING_UP`] before the
+        /// first result of that; 0 while watching, or while nothing is known yet of an alarm that
+        /// stood before the identifier began.
         pub identifying: u32,
         /// Steps that met impossible or non-finite evidence and kept the prediction.
         pub degenerate_count: u32,

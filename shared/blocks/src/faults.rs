@@ -69,9 +69,31 @@ pub struct FaultRecord, size 576 {
 }
 }
 
+part! {
+/// What a supervisor leaves to one that replaces it in the same run.
+#[derive(CheckpointValue)]
+pub struct Carryover, size 48 {
+    /// The run.
+    pub run_id: u64,
+    /// Capture time of the frame that raised the detector's alarm, ns; 0 while none stands.
+    pub detected_t_capture_ns: u64,
+    /// The detector's probability of a fault.
+    pub p_fault: f64,
+    /// See [`crate::Action::alarm_t_capture_ns`].
+    pub alarm_t_capture_ns: u64,
+    /// Hash of the decision model.
+    pub model_hash: u64,
+    /// See [`crate::Action::alarm_count`].
+    pub alarm_count: u32,
+    /// 1 + the action of the decision model that stands until a new run, whatever is believed; 0
+    /// without one.
+    pub latched: u32,
+}
+}
+
 block! {
     /// Written by the supervisor whenever something changes, and ten times a second.
-    pub struct Faults, size 9296 {
+    pub struct Faults, size 9344 {
         /// Common header.
         pub header: Header,
         /// Hash of the fault tree that gives the nodes their names.
@@ -84,8 +106,32 @@ block! {
         pub dropped_count: u32,
         /// The overall state: an [`OverallState`].
         pub overall: u32,
+        /// What the next supervisor goes on from.
+        pub carryover: Carryover,
         /// The faults, in no order.
         pub records: [FaultRecord; FAULTS],
+    }
+}
+
+impl Carryover {
+    /// The action that stands.
+    #[must_use]
+    pub const fn latched(&self) -> Option<usize> {
+        match self.latched.checked_sub(1) {
+            Some(action) => Some(action as usize),
+            None => None,
+        }
+    }
+
+    /// True if it says another thing than `other`. How probable a fault is wanders: only a
+    /// difference of 0.05 is one.
+    #[must_use]
+    pub fn differs_from(&self, other: &Self) -> bool {
+        let of = |it: &Self| Self {
+            p_fault: 0.0,
+            ..*it
+        };
+        of(self) != of(other) || (self.p_fault - other.p_fault).abs() > 0.05
     }
 }
 

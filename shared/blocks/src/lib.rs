@@ -32,10 +32,12 @@ pub use block::{ascii, name_with_hash};
 pub use control::{Control, ControlCommand};
 pub use detection::{Blindness, DetectionBelief, EVIDENCE, Evidence, Readiness};
 pub use diagnosis::{
-    FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
-    mode_word,
+    CATCHING_UP, FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_BLIND, MODE_MULTIPLE,
+    MODE_UNKNOWN, mode_word,
 };
-pub use faults::{FAULTS, FaultRecord, FaultSource, FaultState, Faults, OverallState, Severity};
+pub use faults::{
+    Carryover, FAULTS, FaultRecord, FaultSource, FaultState, Faults, OverallState, Severity,
+};
 pub use header::{BlockId, Cause, CauseKind, Header};
 pub use health::{Degraded, EVENTS, Event, EventKind, Health, ServiceState};
 pub use journal::{

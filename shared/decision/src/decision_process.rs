@@ -2,7 +2,8 @@
 //! choice, and how they are published.
 
 use vigil_blocks::{
-    Action, AnsweredWheels, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind, ValueKind,
+    Action, AnsweredWheels, Carryover, ControlMode, DECISION_ACTIONS, DECISION_STATES, FaultBelief,
+    RecoveryKind, ValueKind,
 };
 use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_pomdp::policy::Measure;
@@ -12,7 +13,7 @@ use crate::alarm_fusion::Situation;
 use crate::error::SupervisorError;
 use crate::inputs::Inputs;
 use crate::kept;
-use crate::latch::{Latch, stands};
+use crate::latch::{Latch, latches, stands};
 use crate::mapping::{self, ActionMeaning};
 use crate::policy;
 use crate::settings::Settings;
@@ -36,6 +37,12 @@ pub(crate) trait DecisionRule: Checkpoint {
 
     /// Everything begins anew.
     fn reset(&mut self);
+
+    /// Goes on in the run of an earlier supervisor, which told of what was `believed`.
+    fn restore(&mut self, left: &Carryover, believed: Option<&FaultBelief>);
+
+    /// The run that is decided about, and the hash of the model.
+    fn origin(&self) -> (u64, u64);
 
     /// The action that stands whatever is believed.
     fn latched(&self) -> Option<usize>;
@@ -91,6 +98,8 @@ pub(crate) struct DecisionProcess {
     pub step_count: u64,
     pub step: Step,
     pub control_mode: ControlMode,
+    /// The choice is not to be latched at present: the robot creeps instead.
+    pub is_deferred: bool,
     pub run_id: u64,
 }
 
@@ -119,6 +128,7 @@ impl DecisionProcess {
             step_count: 0,
             step: Step::default(),
             control_mode: ControlMode::Policy,
+            is_deferred: false,
             run_id: 0,
             model,
             actions,
@@ -163,11 +173,27 @@ impl DecisionProcess {
             .map_or(RecoveryKind::Stop, |m| m.kind)
     }
 
+    /// Goes on in the run of an earlier supervisor. What stood for the same model stands on; beside
+    /// that or an alarm, the robot stands until something is heard.
+    pub(crate) fn restore(&mut self, left: &Carryover, latch: &mut Latch) {
+        self.run_id = left.run_id;
+        let latched = left.latched().filter(|it| latches(self.kind(*it)));
+        let latched = latched.filter(|_| left.model_hash == self.model.hash());
+        if let Some(action) = latched {
+            latch.restore(action);
+            self.choice = stands(action);
+        }
+        if latched.is_some() || left.detected_t_capture_ns != 0 {
+            self.control_mode = ControlMode::Safe;
+        }
+    }
+
     /// Takes over the policy's choice, unless another action is latched, and the wheels that it is
     /// about.
     pub(crate) fn choose(&mut self, best: Choice, latch: &mut Latch, wheels: &mut Wheels) {
         let choice = latch.choose(best, |action| self.kind(action));
         let before = std::mem::replace(&mut self.choice, choice).action;
+        self.is_deferred = latch.action().is_none() && latches(self.kind(choice.action));
         wheels.choose(self.kind(choice.action), choice.action == before);
     }
 
@@ -175,6 +201,9 @@ impl DecisionProcess {
     pub(crate) fn instruction(&self, wheels: &Wheels) -> Instruction {
         if self.control_mode == ControlMode::Safe {
             return self.safe_stop();
+        }
+        if self.is_deferred {
+            return self.creep();
         }
         let (action, wheels) = (self.choice.action, wheels.about());
         let kind = match self.kind(action) {
@@ -187,6 +216,29 @@ impl DecisionProcess {
             kind,
             wheels,
         }
+    }
+
+    /// The action that the robot does of its own choice.
+    pub(crate) fn done(&self) -> usize {
+        match self.is_deferred {
+            true => self.creep().action,
+            false => self.choice.action,
+        }
+    }
+
+    /// Evidence is to come as long as a call for help is put off; a model without such an action
+    /// stops.
+    fn creep(&self) -> Instruction {
+        let is_slow = |m: &ActionMeaning| m.kind == RecoveryKind::SlowDown;
+        let slow_down = self.actions.iter().position(is_slow);
+        slow_down.map_or_else(
+            || self.safe_stop(),
+            |action| Instruction {
+                action,
+                kind: RecoveryKind::SlowDown,
+                wheels: AnsweredWheels::default(),
+            },
+        )
     }
 
     /// The stop of a safe mode: the model's action of that kind, if it has one, else the present

@@ -1,6 +1,6 @@
 //! Decisions about the leaves of the fault tree: the identifier's belief is the evidence.
 
-use vigil_blocks::{Action, ControlMode, DetectionBelief, FaultBelief};
+use vigil_blocks::{Action, Carryover, ControlMode, DetectionBelief, FaultBelief};
 use vigil_checkpoint::Checkpoint;
 use vigil_pomdp::policy::Measure;
 use vigil_pomdp::{Choice, Control};
@@ -15,7 +15,7 @@ use crate::mapping::Compensation;
 use crate::settings::Settings;
 use crate::settling::{Settling, folded};
 use crate::state_belief::{
-    self, MOVED, cap_nominal, distance, normalise, position, write_fallback, write_weights,
+    self, MOVED, distance, normalise, position, write_fallback, write_weights,
 };
 use crate::states::{self, StateMeaning, Subject};
 use crate::switching_cost::SwitchingCost;
@@ -117,22 +117,21 @@ impl FaultDecision {
         let process = &mut self.process;
         let before = process.tracker.belief();
         let weights = &mut process.scratch;
-        let answerable = self.wheels.answerable();
-        write_weights(
-            diagnosis,
-            &self.states,
-            answerable,
-            situation.alarm,
-            weights,
-        );
-        normalise(weights);
-        cap_nominal(&self.states, situation.p_nominal_max, weights);
         let mut settling = self.settling;
+        if situation.is_heard {
+            let answerable = self.wheels.answerable();
+            let alarm = situation.alarm;
+            write_weights(diagnosis, &self.states, answerable, alarm, weights);
+            normalise(weights);
+        } else {
+            write_fallback(situation, &self.states, settling.held(), weights);
+        }
         if timed {
             process.log_evidence = log_score(&folded(&self.states, before), weights);
         }
-        // Of a robot that rests no evidence comes, and none ends.
-        if timed && !situation.rests {
+        // Of a robot that rests no evidence comes, and none ends; that of an identifier which is
+        // not heard yet is still to come.
+        if timed && !situation.rests && situation.is_heard {
             settling.pass(&self.states, before);
         }
         settling.take(&self.states, weights);
@@ -140,7 +139,7 @@ impl FaultDecision {
         let is_due = timed
             || process.control_mode != ControlMode::Policy
             || distance(before, weights) > MOVED
-            || self.wheels.have_moved(diagnosis);
+            || situation.is_heard && self.wheels.have_moved(diagnosis);
         if !is_due {
             return;
         }
@@ -148,15 +147,17 @@ impl FaultDecision {
         process.control_mode = ControlMode::Policy;
         process.tracker.anchor(&process.scratch);
         self.settling = settling;
-        self.wheels.take(diagnosis);
+        if situation.is_heard {
+            self.wheels.take(diagnosis);
+        }
         self.decide(t_capture_ns);
     }
 
     /// Predicts the belief at the end of an epoch; true if it has ended. A call is one step of the
-    /// model, however long it takes: it ends with a reset.
+    /// model, however long it takes: it ends with a reset. One that is put off is none.
     fn pass_time(&mut self, t_capture_ns: u64) -> bool {
         let is_over = self.epoch_clock.is_over(t_capture_ns);
-        if is_over && self.latch.action().is_none() {
+        if is_over && self.latch.action().is_none() && !self.process.is_deferred {
             let process = &mut self.process;
             process
                 .tracker
@@ -178,8 +179,8 @@ impl FaultDecision {
         let t_capture_ns = detection.header.t_capture_ns;
         self.pass_time(t_capture_ns);
         let process = &mut self.process;
-        let belief = process.tracker.belief();
-        write_fallback(situation, &self.states, belief, &mut process.scratch);
+        let held = self.settling.held();
+        write_fallback(situation, &self.states, held, &mut process.scratch);
         process.tracker.anchor(&process.scratch);
         process.control_mode = ControlMode::Fallback;
         process.log_evidence = 0.0;
@@ -195,8 +196,12 @@ impl FaultDecision {
         let process = &mut self.process;
         let best = process.decider.decide(process.tracker.belief()).choice();
         let held = process.choice;
-        // A step for information lasts as long as it is asked for.
-        let is_free = process.decider.measure() != Measure::Value || held.control == Control::Dual;
+        // Nothing is held before the first decision. A step for information lasts as long as it is
+        // asked for; what is deferred is not done.
+        let is_free = before.is_none()
+            || process.decider.measure() != Measure::Value
+            || held.control == Control::Dual
+            || process.is_deferred;
         if is_free {
             self.switching.forget();
             return self.choose(best);
@@ -239,12 +244,26 @@ impl DecisionRule for FaultDecision {
         if detection.is_some() {
             self.process.losses.detection();
         }
+        let is_lost = diagnosis.is_none() && self.process.losses.identifier_is_lost();
+        self.latch
+            .keep_open(!situation.may_latch || is_lost && situation.is_heard);
+        let is_late = !situation.is_heard && !situation.is_lost;
         match (diagnosis, detection) {
-            (Some(diagnosis), _) => {
+            // What was believed stands until it has a result.
+            (Some(diagnosis), _) if diagnosis.is_catching_up() || is_late => {
+                self.process.losses.diagnosis();
+                self.begin_run(diagnosis.run_id);
+            }
+            (Some(diagnosis), _) if situation.is_heard || !situation.may_latch => {
                 self.process.losses.diagnosis();
                 self.take_diagnosis(diagnosis, situation);
             }
-            (None, Some(detection)) if self.process.losses.identifier_is_lost() => {
+            // An identifier that is not waited for is as good as none.
+            (Some(_), Some(detection)) => {
+                self.process.losses.diagnosis();
+                self.fall_back(detection, situation);
+            }
+            (None, Some(detection)) if is_lost => {
                 self.fall_back(detection, situation);
             }
             _ => {}
@@ -276,6 +295,31 @@ impl DecisionRule for FaultDecision {
 
     fn improve(&mut self) {
         self.process.improve();
+    }
+
+    fn restore(&mut self, left: &Carryover, believed: Option<&FaultBelief>) {
+        let process = &mut self.process;
+        process.restore(left, &mut self.latch);
+        let is_sound = |d: &&FaultBelief| state_belief::is_sound(d, &self.states, self.tree_hash);
+        let believed = believed.filter(|_| left.detected_t_capture_ns != 0);
+        if let Some(believed) = believed.filter(is_sound) {
+            let answerable = self.wheels.answerable();
+            write_weights(
+                believed,
+                &self.states,
+                answerable,
+                true,
+                &mut process.scratch,
+            );
+            normalise(&mut process.scratch);
+            process.tracker.anchor(&process.scratch);
+            self.settling = Settling::new(&process.scratch);
+            self.wheels.take(believed);
+        }
+    }
+
+    fn origin(&self) -> (u64, u64) {
+        (self.process.run_id, self.process.model.hash())
     }
 
     fn latched(&self) -> Option<usize> {

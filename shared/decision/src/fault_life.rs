@@ -12,8 +12,8 @@ mod settings;
 mod tracked;
 
 use vigil_blocks::{
-    Action, FAULTS, FaultBelief, FaultRecord, FaultSource, FaultState, Faults, MODE_UNKNOWN,
-    OverallState, RecoveryKind, SensorFrame, Severity,
+    Action, FAULTS, FaultBelief, FaultRecord, FaultSet, FaultSource, FaultState, Faults,
+    MODE_UNKNOWN, OverallState, RecoveryKind, SensorFrame, Severity,
 };
 use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_robot::FaultTree;
@@ -124,6 +124,34 @@ impl FaultLife {
         }
         self.fault_count = block.fault_count;
         self.revision = block.revision;
+    }
+
+    /// What is active, as a diagnosis of all of it together; `None` if nothing of the robot is.
+    /// Allocates.
+    #[must_use]
+    pub fn diagnosis(&self, tree_hash: u64) -> Option<Box<FaultBelief>> {
+        let active = self.tracked.iter().filter(|it| it.is_active());
+        let active: Vec<(u32, f64)> = active.map(|it| (it.record.what, it.record.p)).collect();
+        let p = active.iter().map(|(_, p)| *p).reduce(f64::min)?;
+        let leaves = active
+            .iter()
+            .filter(|(what, _)| self.present.is_leaf(*what));
+        let leaves = leaves.fold(0, |set, (what, _)| set | 1_u64 << what);
+        let mut told = Box::new(FaultBelief {
+            tree_hash,
+            identifying: 1,
+            ..FaultBelief::default()
+        });
+        told.p[0] = 1.0 - p;
+        if leaves == 0 {
+            told.p_unknown = p;
+        } else {
+            (told.sets[0], told.set_count) = (FaultSet { leaves, p }, 1);
+            let of_set = |(node, _): &(usize, &mut f64)| leaves >> node & 1 == 1;
+            let nodes = told.p.iter_mut().enumerate().filter(of_set);
+            nodes.for_each(|(_, it)| *it = p);
+        }
+        Some(told)
     }
 
     /// Keeps a frame, for the freeze frame of a fault that begins about then.

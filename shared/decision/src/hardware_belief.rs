@@ -9,7 +9,7 @@ use crate::alarm_fusion::Situation;
 use crate::answerable::AnswerableFaults;
 use crate::error::SupervisorError;
 use crate::joint_states::JointStates;
-use crate::state_belief::{self, cap_nominal, normalise, write_fallback, write_weights};
+use crate::state_belief::{self, normalise, write_fallback, write_weights};
 use crate::states::StateMeaning;
 
 /// Probabilities of the hardware's states, as the identifier holds them.
@@ -61,7 +61,6 @@ impl HardwareBelief {
             let sets = answerable.sets();
             write_weights(diagnosis, states, &sets, situation.alarm, p);
             normalise(p);
-            cap_nominal(states, situation.p_nominal_max, p);
         });
     }
 

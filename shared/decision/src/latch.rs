@@ -9,6 +9,8 @@ use vigil_pomdp::{Choice, Control};
 #[derive(Debug, Clone, Copy, Default, Checkpoint)]
 pub(crate) struct Latch {
     action: Option<usize>,
+    /// Nothing is latched at present.
+    is_open: bool,
 }
 
 impl Latch {
@@ -18,11 +20,7 @@ impl Latch {
             Some(action) if action != best.action => stands(action),
             _ => best,
         };
-        let latches = matches!(
-            kind(choice.action),
-            RecoveryKind::CallForHelp | RecoveryKind::GiveUp
-        );
-        if self.action.is_none() && latches {
+        if self.action.is_none() && !self.is_open && latches(kind(choice.action)) {
             self.action = Some(choice.action);
         }
         self.assert_stands(choice);
@@ -36,6 +34,16 @@ impl Latch {
         );
     }
 
+    /// Whether nothing is to be latched at present: what would be is not known well enough.
+    pub(crate) const fn keep_open(&mut self, is_open: bool) {
+        self.is_open = is_open;
+    }
+
+    /// This action stands, as it did for an earlier supervisor.
+    pub(crate) const fn restore(&mut self, action: usize) {
+        self.action = Some(action);
+    }
+
     /// The action that stands.
     pub(crate) const fn action(&self) -> Option<usize> {
         self.action
@@ -45,6 +53,11 @@ impl Latch {
     pub(crate) const fn release(&mut self) {
         self.action = None;
     }
+}
+
+/// True of what stands once it was taken.
+pub(crate) const fn latches(kind: RecoveryKind) -> bool {
+    matches!(kind, RecoveryKind::CallForHelp | RecoveryKind::GiveUp)
 }
 
 /// The choice of an action that stands although another may be better.
@@ -63,7 +76,9 @@ mod tests {
     #[test]
     #[should_panic(expected = "a latched action stands until a reset")]
     fn a_latch_that_is_left_is_caught() {
-        Latch { action: Some(1) }.assert_stands(stands(2));
+        let mut latch = Latch::default();
+        latch.restore(1);
+        latch.assert_stands(stands(2));
     }
 
     #[test]
@@ -87,6 +102,12 @@ mod tests {
                 assert_eq!(latch.choose(best(other), kind), stands(called));
                 assert_eq!(latch.action(), Some(called));
             }
+            latch.release();
+            latch.keep_open(true);
+            assert_eq!(latch.choose(best(called), kind), best(called));
+            assert_eq!(latch.action(), None);
+            latch.restore(called);
+            assert_eq!(latch.choose(best(0), kind), stands(called));
             latch.release();
             assert_eq!(latch.choose(best(0), kind), best(0));
         }

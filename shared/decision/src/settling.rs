@@ -20,12 +20,12 @@ const SETTLED_P: f64 = 0.8;
 pub(crate) struct Settling {
     p_settled: f64,
     is_settled: bool,
-    /// The last belief of the identifier, in settled states.
+    /// The last belief, in settled states.
     held: [f64; DECISION_STATES],
 }
 
 impl Settling {
-    /// A run has begun, with nothing wrong: this belief, in settled states.
+    /// This is believed, in settled states; a run begins with nothing wrong.
     pub(crate) fn new(belief: &[f64]) -> Self {
         let mut held = [0.0; DECISION_STATES];
         held.iter_mut().zip(belief).for_each(|(to, b)| *to = *b);
@@ -34,6 +34,11 @@ impl Settling {
             is_settled: true,
             held,
         }
+    }
+
+    /// What was believed last, in settled states.
+    pub(crate) const fn held(&self) -> &[f64] {
+        &self.held
     }
 
     /// A step of the model has passed while the robot moved, and `predicted` is its belief now.

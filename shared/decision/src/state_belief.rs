@@ -77,8 +77,8 @@ pub(crate) fn write_weights(
     }
 }
 
-/// The same without an identifier: the detector says how probable a fault is, the belief before
-/// the loss which one, and without that it is unknown. Before an alarm the detector's odds mean
+/// The same while no identifier is heard: the detector says how probable a fault is, the belief
+/// before which one, and without that it is unknown. Before an alarm the detector's odds mean
 /// nothing.
 pub(crate) fn write_fallback(
     situation: Situation,
@@ -101,7 +101,7 @@ pub(crate) fn write_fallback(
             Subject::Nominal if meaning.settles_to.is_some() => 0.0,
             Subject::Nominal => 1.0 - p_fault,
             Subject::Done => 0.0,
-            _ if faulty > 0.0 => p_fault * (b / faulty),
+            _ if faulty > MOVED => p_fault * (b / faulty),
             _ if Some(state) == unknown => p_fault,
             _ => 0.0,
         };
@@ -112,17 +112,6 @@ pub(crate) fn write_fallback(
 pub(crate) fn normalise(weights: &mut [f64]) {
     let sum: f64 = weights.iter().sum();
     weights.iter_mut().for_each(|weight| *weight /= sum);
-}
-
-/// Makes nominal as probable as `p_max` at most; the unknown, where there is one, takes the rest.
-pub(crate) fn cap_nominal(states: &[StateMeaning], p_max: f64, weights: &mut [f64]) {
-    let place = |subject| position(states, subject);
-    let places = (place(Subject::Nominal), place(Subject::Unknown));
-    if let (Some(nominal), Some(unknown)) = places {
-        let excess = (weights[nominal] - p_max).max(0.0);
-        weights[nominal] -= excess;
-        weights[unknown] += excess;
-    }
 }
 
 /// Half the sum of absolute differences.

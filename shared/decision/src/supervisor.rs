@@ -1,6 +1,6 @@
 //! One decision cycle.
 
-use vigil_blocks::{Action, Entry};
+use vigil_blocks::{Action, Carryover, Entry, FaultBelief};
 use vigil_checkpoint::Checkpoint;
 use vigil_pomdp::{PointBased, Pomdp};
 use vigil_robot::{Description, FaultTree};
@@ -100,6 +100,31 @@ impl Supervisor {
         }
     }
 
+    /// Goes on from what an earlier supervisor of the same graph has left, and what it told of.
+    pub fn restore(&mut self, left: &Carryover, believed: Option<&FaultBelief>) {
+        self.fusion.restore(left);
+        self.rule.restore(left, believed);
+    }
+
+    /// What a supervisor that replaces this one goes on from.
+    #[must_use]
+    pub fn carryover(&self) -> Carryover {
+        let (run_id, model_hash) = self.rule.origin();
+        let latched = self.rule.latched();
+        Carryover {
+            run_id,
+            model_hash,
+            latched: latched.map_or(0, |action| action as u32 + 1),
+            ..self.fusion.carryover()
+        }
+    }
+
+    /// False while the identifier knows nothing yet of an alarm that stands.
+    #[must_use]
+    pub fn hears_identifier(&self) -> bool {
+        self.fusion.situation().is_heard
+    }
+
     /// The action that stands whatever is believed: a call for help, or the end of the task. It
     /// stands until a new run or a reset.
     #[must_use]
@@ -124,6 +149,10 @@ mod tests {
             self.0 = u64::from(count);
         }
         fn reset(&mut self) {}
+        fn restore(&mut self, _: &Carryover, _: Option<&FaultBelief>) {}
+        fn origin(&self) -> (u64, u64) {
+            (0, 0)
+        }
         fn latched(&self) -> Option<usize> {
             None
         }

@@ -2,7 +2,7 @@
 //! the identifier says about the hardware.
 
 use vigil_blocks::{
-    Action, ActionOutcome, ControlMode, DetectionBelief, FaultBelief, RecoveryKind,
+    Action, ActionOutcome, Carryover, ControlMode, DetectionBelief, FaultBelief, RecoveryKind,
 };
 use vigil_checkpoint::Checkpoint;
 use vigil_robot::{Description, FaultTree};
@@ -50,7 +50,8 @@ pub(crate) struct SymptomDecision {
     action_ns: u64,
     /// The call for help, or the end of the task, that stands.
     latch: Latch,
-    last_kind: Option<RecoveryKind>,
+    /// Whether the robot was told to stop, and whether the choice was put off.
+    last: Option<(bool, bool)>,
 }
 
 impl SymptomDecision {
@@ -79,7 +80,7 @@ impl SymptomDecision {
             epoch_ns: (settings.epoch_ms * 1e6) as u64,
             action_ns: (settings.action_max_s * 1e9) as u64,
             latch: Latch::default(),
-            last_kind: None,
+            last: None,
         };
         rule.choose();
         Ok(rule)
@@ -99,12 +100,19 @@ impl SymptomDecision {
         self.follow_hardware(wheels_moved);
     }
 
-    fn take_detection(&mut self, detection: &DetectionBelief, situation: Situation) {
+    fn take_detection(&mut self, detection: &DetectionBelief, is_lost: bool, situation: Situation) {
         self.begin_run(detection.run_id);
         self.process.control_mode = ControlMode::Policy;
-        if self.process.losses.identifier_is_lost() {
+        if is_lost {
             self.process.control_mode = ControlMode::Fallback;
             self.take_alarm(detection, situation);
+        }
+        if self.process.is_deferred && situation.may_latch {
+            let before = self.process.choice.action;
+            self.choose();
+            if self.process.choice.action != before {
+                self.open_decision();
+            }
         }
         self.gather(detection);
     }
@@ -119,7 +127,8 @@ impl SymptomDecision {
         let set = self.epoch.take_set(detection.header.t_capture_ns, end);
         self.track(set, end);
         let before = self.process.choice.action;
-        let again = end != End::Unfinished && self.latch.action().is_none() && self.has_end(before);
+        let has_end = self.has_end(self.process.done());
+        let again = end != End::Unfinished && self.latch.action().is_none() && has_end;
         self.choose();
         // What has an end is done again when it is decided again; what goes on, goes on.
         if self.process.choice.action != before || again {
@@ -127,7 +136,7 @@ impl SymptomDecision {
         }
     }
 
-    /// The identifier is lost: the detector says whether something is wrong.
+    /// No identifier is heard: the detector says whether something is wrong.
     fn take_alarm(&mut self, detection: &DetectionBelief, situation: Situation) {
         if !(0.0..=1.0).contains(&detection.p_fault) {
             self.process.refuse();
@@ -171,7 +180,7 @@ impl SymptomDecision {
 
     fn limits(&self) -> Limits {
         let unless_latched = |ns: u64| self.latch.action().is_none().then_some(ns);
-        let action = self.process.choice.action;
+        let action = self.process.done();
         let own_ns = self.process.actions.get(action).and_then(|m| m.epoch_ns);
         Limits {
             epoch_ns: unless_latched(own_ns.unwrap_or(self.epoch_ns)),
@@ -183,7 +192,7 @@ impl SymptomDecision {
     /// The action that the model's step is of. What did not end is a step of following the path, or
     /// of the present action where the model cannot follow.
     fn step_action(&self, end: End) -> usize {
-        let action = self.process.choice.action;
+        let action = self.process.done();
         let reports_outcome = self.reports_outcome[action];
         if end == End::Done || (end == End::Failed && reports_outcome) {
             return action;
@@ -198,7 +207,7 @@ impl SymptomDecision {
         let action = self.step_action(end);
         let process = &mut self.process;
         // Nothing was seen of an action that was not done: no news.
-        if set == 0 && action != process.choice.action {
+        if set == 0 && action != process.done() {
             process.tracker.predict(&process.model, action);
             self.take_over(0.0);
             return;
@@ -236,7 +245,7 @@ impl SymptomDecision {
         let is_new = detection.run_id != self.process.run_id;
         let is_done = detection.action_seq == self.process.decision_seq
             && detection.action_outcome == ActionOutcome::Succeeded as u32;
-        if is_new && is_done {
+        if is_new && is_done && !self.process.is_deferred {
             self.process.run_id = detection.run_id;
             if let Some(hardware) = &mut self.hardware {
                 hardware.forget();
@@ -281,14 +290,25 @@ impl DecisionRule for SymptomDecision {
             self.process.refuse();
             self.miss(1);
         }
-        if let Some(diagnosis) = diagnosis {
+        let is_lost = diagnosis.is_none() && self.process.losses.identifier_is_lost();
+        self.latch
+            .keep_open(!situation.may_latch || is_lost && situation.is_heard);
+        let has_result = |it: &&FaultBelief| situation.is_heard && !it.is_catching_up();
+        if diagnosis.is_some() {
             self.process.losses.diagnosis_alone();
+        }
+        let told = diagnosis.filter(has_result);
+        if let Some(diagnosis) = told {
             self.take_diagnosis(diagnosis, situation);
         }
         match inputs.detection {
             Some(detection) => {
                 self.process.losses.detection();
-                self.take_detection(detection, situation);
+                let is_lost = self.process.losses.identifier_is_lost() || situation.is_lost;
+                let knows = told.is_some() || is_lost || !situation.alarm;
+                if knows || self.process.control_mode != ControlMode::Safe {
+                    self.take_detection(detection, is_lost, situation);
+                }
             }
             // A diagnosis holds no symptoms, and does not make up for missing ones.
             None if !refuses && self.process.losses.no_detection() => self.enter_safe_mode(),
@@ -328,16 +348,26 @@ impl DecisionRule for SymptomDecision {
         self.process.improve();
     }
 
+    fn restore(&mut self, left: &Carryover, _: Option<&FaultBelief>) {
+        self.process.restore(left, &mut self.latch);
+    }
+
+    fn origin(&self) -> (u64, u64) {
+        (self.process.run_id, self.process.model.hash())
+    }
+
     fn latched(&self) -> Option<usize> {
         self.latch.action()
     }
 
     fn write(&mut self, action: &mut Action) {
         let instruction = self.process.instruction(&self.wheels);
-        // The stop of the safe mode, and its end, are decisions of their own.
-        let stops = |kind| kind == RecoveryKind::Stop;
-        let last = self.last_kind.replace(instruction.kind);
-        if last.is_some_and(|last| stops(last) != stops(instruction.kind)) {
+        // The stop of the safe mode, what is done while a choice is put off, and the end of both
+        // are decisions of their own.
+        let stops = instruction.kind == RecoveryKind::Stop;
+        let now = (stops, self.process.is_deferred);
+        let last = self.last.replace(now);
+        if last.is_some_and(|last| last != now) {
             self.open_decision();
         }
         self.process.write(instruction, action);

@@ -15,12 +15,32 @@ const CLEAR_S: f64 = 1.0;
 /// Slack when that time is compared, s: it is a sum of short intervals.
 const TIME_SLACK_S: f64 = 1e-6;
 
+/// For how long log-odds have been as low as those that end an alarm.
+#[derive(Debug, Clone, Copy, Default, PartialEq, CheckpointValue)]
+pub struct Lull {
+    quiet_s: f64,
+}
+
+impl Lull {
+    /// Takes the log-odds of the last `dt_s`, about an alarm that rises above `threshold_log_odds`;
+    /// true once they have been low for a second. What is not low begins the second anew.
+    pub fn take(&mut self, log_odds: f64, threshold_log_odds: f64, dt_s: f64) -> bool {
+        let low = (threshold_log_odds - CLEAR_BELOW).min(CLEAR_LOG_ODDS);
+        self.quiet_s = if log_odds < low {
+            self.quiet_s + dt_s
+        } else {
+            0.0
+        };
+        self.quiet_s >= CLEAR_S - TIME_SLACK_S
+    }
+}
+
 /// An alarm that rises above a threshold and falls once the log-odds have been low for a second.
 #[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct Alarm {
     threshold_log_odds: f64,
     stands: bool,
-    quiet_s: f64,
+    lull: Lull,
 }
 
 impl Alarm {
@@ -30,7 +50,7 @@ impl Alarm {
         Self {
             threshold_log_odds,
             stands: false,
-            quiet_s: 0.0,
+            lull: Lull { quiet_s: 0.0 },
         }
     }
 
@@ -48,24 +68,19 @@ impl Alarm {
 
     /// Ends the alarm.
     pub const fn reset(&mut self) {
-        (self.stands, self.quiet_s) = (false, 0.0);
+        (self.stands, self.lull) = (false, Lull { quiet_s: 0.0 });
     }
 
     /// Takes the log-odds of the last `dt_s`; true if the alarm rises with them. An alarm falls
     /// only while the robot `is_excited`: at rest low log-odds show nothing.
     pub fn take(&mut self, log_odds: f64, dt_s: f64, is_excited: bool) -> bool {
         if !self.stands {
-            (self.stands, self.quiet_s) = (log_odds > self.threshold_log_odds, 0.0);
+            self.stands = log_odds > self.threshold_log_odds;
+            self.lull = Lull::default();
             return self.stands;
         }
         if is_excited {
-            let low = (self.threshold_log_odds - CLEAR_BELOW).min(CLEAR_LOG_ODDS);
-            self.quiet_s = if log_odds < low {
-                self.quiet_s + dt_s
-            } else {
-                0.0
-            };
-            self.stands = self.quiet_s < CLEAR_S - TIME_SLACK_S;
+            self.stands = !self.lull.take(log_odds, self.threshold_log_odds, dt_s);
         }
         false
     }

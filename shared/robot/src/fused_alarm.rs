@@ -5,6 +5,7 @@
 //! of motion at most. After that the identifier decides, until its p(nominal) falls or the detector
 //! raises another alarm.
 
+use vigil_blocks::Carryover;
 use vigil_checkpoint::CheckpointValue;
 
 /// Probability of nominal above which a diagnosis contradicts an alarm. Even odds: a lower bound
@@ -33,11 +34,9 @@ pub struct StageBeliefs {
     pub moved_s: f64,
     /// True while the detector's alarm stands.
     pub alarm: bool,
-    /// Capture time of the frame that raised the detector's alarm, ns.
+    /// Capture time of the frame that raised the detector's alarm, ns: it tells alarms apart.
     pub alarm_t_ns: u64,
-    /// Alarms that the detector has raised, and those before it.
-    pub alarm_count: u32,
-    /// The identifier's probability that nothing is wrong; 0 without an identifier.
+    /// The identifier's probability that nothing is wrong; 0 if none is heard.
     pub p_nominal: f64,
     /// Faults in the set that the identifier reports; 0 for none.
     pub faults: u32,
@@ -50,9 +49,9 @@ pub struct FusedAlarm {
     stands: bool,
     t_ns: u64,
     count: u32,
-    /// The detector's alarm and its count in the frame before.
+    /// The detector's alarm in the frame before, and when it was raised, ns.
     was_raised: bool,
-    raised_count: u32,
+    raised_t_ns: u64,
     nominal_s: f64,
     /// Most faults reported during this alarm, and for how long there have been more.
     faults: u32,
@@ -60,6 +59,21 @@ pub struct FusedAlarm {
 }
 
 impl FusedAlarm {
+    /// The alarm that an earlier supervisor of the same run has left.
+    #[must_use]
+    pub fn restored(left: &Carryover) -> Self {
+        let was_raised = left.detected_t_capture_ns != 0;
+        let stands = was_raised && left.alarm_t_capture_ns != 0;
+        Self {
+            stands,
+            t_ns: if stands { left.alarm_t_capture_ns } else { 0 },
+            count: left.alarm_count,
+            was_raised,
+            raised_t_ns: left.detected_t_capture_ns,
+            ..Self::default()
+        }
+    }
+
     /// True while it stands.
     #[must_use]
     pub const fn stands(&self) -> bool {
@@ -99,8 +113,8 @@ impl FusedAlarm {
     }
 
     fn update(&mut self, stages: &StageBeliefs) {
-        let is_new = !self.was_raised || stages.alarm_count != self.raised_count;
-        (self.was_raised, self.raised_count) = (stages.alarm, stages.alarm_count);
+        let is_new = !self.was_raised || stages.alarm_t_ns != self.raised_t_ns;
+        (self.was_raised, self.raised_t_ns) = (stages.alarm, stages.alarm_t_ns);
         if !stages.alarm {
             return self.fall();
         }
@@ -161,7 +175,6 @@ mod tests {
         moved_s: 0.1,
         alarm: true,
         alarm_t_ns: 5,
-        alarm_count: 1,
         p_nominal: 0.01,
         faults: 0,
     };
@@ -193,7 +206,7 @@ mod tests {
         alarm.take(&QUIET);
         assert_eq!((alarm.stands(), alarm.t_ns(), alarm.count()), (false, 0, 1));
         alarm.take(&StageBeliefs {
-            alarm_count: 2,
+            alarm_t_ns: 6,
             ..ALARM
         });
         assert_eq!((alarm.stands(), alarm.count()), (true, 2));
@@ -249,12 +262,12 @@ mod tests {
         takes(&mut alarm, 10, nominal);
         assert!(!alarm.stands());
         alarm.take(&StageBeliefs {
-            alarm_count: 2,
+            alarm_t_ns: 6,
             ..nominal
         });
         assert_eq!((alarm.stands(), alarm.count()), (true, 2));
         alarm.take(&StageBeliefs {
-            alarm_count: 3,
+            alarm_t_ns: 7,
             ..ALARM
         });
         assert_eq!((alarm.stands(), alarm.count()), (true, 3));
@@ -285,6 +298,36 @@ mod tests {
         assert!(!alarm.stands());
         alarm.take(&QUIET);
         assert_eq!((alarm.stands(), alarm.count()), (false, 1));
+    }
+
+    #[test]
+    fn what_an_earlier_supervisor_has_left_stands_on_and_is_no_other_alarm() {
+        let left = Carryover {
+            detected_t_capture_ns: 5,
+            alarm_t_capture_ns: 6,
+            alarm_count: 3,
+            ..Carryover::default()
+        };
+        let mut alarm = FusedAlarm::restored(&left);
+        alarm.take(&ALARM);
+        assert_eq!((alarm.stands(), alarm.t_ns(), alarm.count()), (true, 6, 3));
+        // One that the identifier had ended stays so.
+        let ended = Carryover {
+            alarm_t_capture_ns: 0,
+            ..left
+        };
+        let mut alarm = FusedAlarm::restored(&ended);
+        alarm.take(&StageBeliefs {
+            p_nominal: 0.9,
+            ..ALARM
+        });
+        assert_eq!((alarm.stands(), alarm.count()), (false, 3));
+        // Without the detector's there is none.
+        let none = Carryover {
+            detected_t_capture_ns: 0,
+            ..left
+        };
+        assert!(!FusedAlarm::restored(&none).stands());
     }
 
     #[test]
@@ -384,14 +427,14 @@ mod tests {
         #[test]
         fn it_follows_the_detector_whatever_the_identifier_says(
             all in prop::collection::vec(
-                (any::<[u64; 2]>(), any::<[u32; 2]>(), any::<(u64, u64, bool)>()), 1..60),
+                (any::<[u64; 2]>(), any::<u32>(), any::<(u64, u64, bool)>()), 1..60),
         ) {
             let mut alarm = FusedAlarm::default();
             let mut count = 0;
-            for (bits, [alarm_count, faults], (t_ns, alarm_t_ns, raised)) in all {
+            for (bits, faults, (t_ns, alarm_t_ns, raised)) in all {
                 let [moved_s, p_nominal] = bits.map(f64::from_bits);
                 let stages = StageBeliefs {
-                    t_ns, moved_s, alarm: raised, alarm_t_ns, alarm_count, p_nominal, faults,
+                    t_ns, moved_s, alarm: raised, alarm_t_ns, p_nominal, faults,
                 };
                 alarm.take(&stages);
                 prop_assert!(raised || !alarm.stands());

@@ -1,13 +1,14 @@
 //! Where two blocks are not the same.
 
 use vigil_blocks::layout::{Field, Layout};
-use vigil_blocks::{Block, BlockId, FaultRecord, FaultSet};
+use vigil_blocks::{Block, BlockId, Carryover, FaultRecord, FaultSet};
 
 /// Fields that belong to the ports, not to the step.
 const OF_THE_PORTS: [&str; 3] = ["header", "cause", "valid_until_ns"];
 
 /// What blocks are made of, beside numbers.
-const PARTS: [(&str, &[Field]); 2] = [
+const PARTS: [(&str, &[Field]); 3] = [
+    (Carryover::NAME, Carryover::FIELDS),
     (FaultRecord::NAME, FaultRecord::FIELDS),
     (FaultSet::NAME, FaultSet::FIELDS),
 ];

@@ -10,7 +10,7 @@ use vigil_decision::Inputs;
 use vigil_diagnosis::detect::Detector;
 use vigil_diagnosis::identify::{Diagnoser, Input};
 use vigil_setup::Setup;
-use vigil_supervisor::{FaultStep, Steps};
+use vigil_supervisor::Steps;
 
 use crate::blocks::Blocks;
 use crate::error::ReplayError;
@@ -224,7 +224,7 @@ fn decide(
         JournalKind::Reset => steps.supervisor.step(Entry::Reset, action),
         JournalKind::Begun | JournalKind::Looked | JournalKind::Refused => {}
         Restored | Kept | Lived | Ordered | Told => {
-            live(&mut steps.faults, kind, entry, (blocks, &mut to.faults))?;
+            live(steps, kind, entry, (blocks, &mut to.faults))?;
         }
     }
     Ok(())
@@ -232,7 +232,7 @@ fn decide(
 
 /// What the faults' life takes.
 fn live(
-    step: &mut FaultStep,
+    steps: &mut Steps,
     kind: JournalKind,
     entry: &JournalEntry,
     (blocks, faults): (&Blocks, &mut Faults),
@@ -240,20 +240,20 @@ fn live(
     match kind {
         Restored => {
             let left = entry.input().and_then(|id| blocks.faults.get(id));
-            step.restore(left.ok_or(Missing::Faults)?);
+            steps.restore(left.ok_or(Missing::Faults)?);
         }
         Kept => {
             let frame = entry.input().and_then(|id| blocks.frames.get(id));
-            step.keep(frame.ok_or(Missing::Frame)?);
+            steps.faults.keep(frame.ok_or(Missing::Frame)?);
         }
-        Lived => step.live(entry.t_ns, entry.count),
+        Lived => steps.faults.live(entry.t_ns, entry.count),
         Ordered => {
-            step.obey(entry.count, entry.fault, entry.t_ns);
+            steps.faults.obey(entry.count, entry.fault, entry.t_ns);
         }
-        Told => step.write(faults),
+        Told => steps.write(faults),
         _ => {}
     }
     // The service tells them as events.
-    while step.take_change().is_some() {}
+    while steps.faults.take_change().is_some() {}
     Ok(())
 }

@@ -65,6 +65,11 @@ impl PresentFaults {
         }
     }
 
+    /// True of a leaf of the fault tree.
+    pub(super) const fn is_leaf(&self, node: u32) -> bool {
+        node != 0 && (node as usize) < FAULT_NODES && self.below[node as usize] == 1 << node
+    }
+
     /// Takes a cycle. What was diagnosed stays while nothing is seen.
     pub(super) fn take(&mut self, input: LifeInput<'_>) {
         (self.silent_services, self.blind) = (input.silent_services, input.decided.blind);

@@ -402,6 +402,24 @@ fn another_goes_on_where_one_has_stopped() {
 }
 
 #[test]
+fn what_is_active_is_one_diagnosis() {
+    let mut story = Story::new(&shipped());
+    story.silent_services = 1;
+    assert!(story.life.diagnosis(7).is_none());
+    story.report(FRONT, 1.0);
+    let told = story.life.diagnosis(7).unwrap();
+    assert_eq!((told.tree_hash, told.identifying), (7, 1));
+    assert_eq!((told.p[0], told.p[FRONT as usize]), (1.0 - 0.9, 0.9));
+    assert_eq!((told.sets[0].leaves, told.set_count), (1 << FRONT, 1));
+    let mut story = Story::new(&shipped());
+    story.report(UNKNOWN, 1.0);
+    let told = story.life.diagnosis(7).unwrap();
+    assert_eq!((told.p_unknown, told.set_count), (0.75, 0));
+    story.report(0, 60.0);
+    assert!(story.life.diagnosis(7).is_none());
+}
+
+#[test]
 fn where_no_place_is_free_the_oldest_cleared_fault_gives_way_and_no_other() {
     let mut story = Story::new(&shipped());
     for _ in 0..FAULTS {
@@ -449,6 +467,7 @@ proptest! {
         }
         (left.revision, left.fault_count) = (u64::MAX, u64::MAX);
         life.restore(&left);
+        prop_assert!(life.diagnosis(7).is_none_or(|told| told.set_count <= 1));
         for (reported, now_ns, leaves, words, p) in steps {
             let mut belief = belief(reported % 8);
             if reported % 3 == 0 {

@@ -68,6 +68,13 @@ impl Tracked {
         self.is_kept() && matches!(state, Some(Pending | Active | Acknowledged))
     }
 
+    /// True while the robot has it, for long enough to be told.
+    pub(super) fn is_active(&self) -> bool {
+        use FaultState::{Acknowledged, Active};
+        let state = self.record.state();
+        self.is_of_robot() && self.is_kept() && matches!(state, Some(Active | Acknowledged))
+    }
+
     /// See [`Present::key`].
     pub(super) fn key(&self) -> (u32, u32) {
         let source = FaultSource::from_repr(self.record.source);

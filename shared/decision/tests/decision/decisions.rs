@@ -112,7 +112,7 @@ fn evidence_that_comes_and_goes_does_not_toggle_actions() {
         (world.action.decision_seq, world.kind())
     };
     assert!(decisions(0.0).0 > 200);
-    assert_eq!(decisions(2.0), (2, RecoveryKind::SlowDown));
+    assert_eq!(decisions(2.0), (1, RecoveryKind::SlowDown));
     // What is much better is done at once.
     let mut world = World::with(|settings| settings.switching_cost = 2.0);
     world.rest(50, false, &[("ND", 1.0)]);

@@ -144,6 +144,7 @@ fn what_the_robot_says_it_could_not_do_mends_nothing() {
         assert_eq!(robot.kind(), RecoveryKind::Relocalise);
         // The identifier has no more to say.
         robot.nothing();
+        robot.diagnosis.identifying = 1;
         robot.cycle(0);
         assert_eq!(
             robot.kind(),

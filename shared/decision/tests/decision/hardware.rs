@@ -1,7 +1,8 @@
 //! Navigation and hardware in one model: what identifier and detector say about hardware.
 
 use vigil_blocks::{
-    ActionOutcome, AnsweredWheels, ControlMode, Entry, Readiness, RecoveryKind, Symptoms,
+    ActionOutcome, AnsweredWheels, CATCHING_UP, ControlMode, Entry, Readiness, RecoveryKind,
+    Symptoms,
 };
 use vigil_decision::Inputs;
 
@@ -258,4 +259,53 @@ fn an_identifier_of_another_tree_is_refused_and_symptoms_are_heard_all_the_same(
     robot.cycle(Symptoms::EPM);
     let wrong = ["NNP", "DE", "CROWD", "RT", "PP", "WD", "LST"].map(|it| robot.p(it));
     assert!(wrong.iter().sum::<f64>() > 0.5, "{wrong:?}");
+}
+
+#[test]
+fn a_call_that_is_put_off_is_a_decision_of_its_own_once_it_is_made() {
+    let mut settings = joint_settings();
+    settings.lost_state = None;
+    let mut robot = Navigation::joint();
+    robot.supervisor = build(JOINT, &settings).unwrap();
+    robot.rest(1.0, 0);
+    // Of this alarm the identifier knows nothing.
+    robot.detection.alarm = 1;
+    robot.detection.alarm_t_capture_ns = 7;
+    robot.detection.p_fault = 0.999;
+    robot.nothing();
+    let mut before = (robot.kind(), robot.action.decision_seq);
+    for cycle in 0..6000 {
+        robot.cycle(0);
+        let now = (robot.kind(), robot.action.decision_seq);
+        assert!(
+            now.0 == before.0 || now.1 > before.1,
+            "{cycle}: {before:?}, {now:?}"
+        );
+        assert!(cycle > 490 || now.0 != RecoveryKind::CallForHelp, "{cycle}");
+        assert!(cycle > 490 || robot.supervisor.latched().is_none());
+        before = now;
+    }
+    assert_eq!(before.0, RecoveryKind::CallForHelp);
+    assert!(robot.supervisor.latched().is_some());
+}
+
+#[test]
+fn an_identifier_that_is_late_by_a_cycle_calls_nobody() {
+    let mut settings = joint_settings();
+    settings.lost_state = None;
+    let mut robot = Navigation::joint();
+    robot.supervisor = build(JOINT, &settings).unwrap();
+    robot.rest(1.0, 0);
+    robot.detection.alarm = 1;
+    robot.detection.alarm_t_capture_ns = 7;
+    robot.detection.p_fault = 0.999;
+    robot.nothing();
+    robot.cycle(0);
+    robot.diagnosis.identifying = CATCHING_UP;
+    robot.rest(0.1, 0);
+    assert_eq!(robot.kind(), RecoveryKind::GoOn);
+    robot.identify("RM_STUCK", 0.99);
+    robot.rest(1.0, 0);
+    assert_eq!(robot.supervisor.latched(), None);
+    assert!(robot.p("STUCK") + robot.p("STUCK_NEW") > 0.9);
 }

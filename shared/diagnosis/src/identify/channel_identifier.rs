@@ -11,6 +11,7 @@ use vigil_robot::{ChannelMap, Description, DetectorAlarm, FaultTree};
 
 use crate::identify::identifier::Input;
 use crate::identify::leaf_map::{IdentifierError, LeafMap};
+use crate::identify::onset_sight::OnsetSight;
 use crate::identify::reported::ReportedFault;
 use crate::identify::tree_belief::TreeBelief;
 use crate::invariants;
@@ -19,6 +20,10 @@ use crate::sensors::Sensors;
 /// Log-odds of a fault in the last seconds above which they say which one it is. Chosen: even odds.
 /// Below, as while the robot rests, the last diagnosis stands.
 const TELLING_LOG_ODDS: f64 = 0.0;
+/// Probability of the unknown, given a fault, from which on no fault is named: even odds.
+const NAMED_ELSE: f64 = 0.5;
+/// Longest time between two frames that counts, s.
+const STEP_MAX_S: f64 = 0.5;
 
 /// What is believed of the components, given that something is wrong.
 #[derive(Debug, Clone, Copy, CheckpointValue)]
@@ -69,6 +74,11 @@ pub struct ChannelIdentifier {
     t_ns: u64,
     moved_s: f64,
     alarm: DetectorAlarm,
+    sight: OnsetSight,
+    /// The robot moved at the last detection.
+    moves: bool,
+    /// The last seconds have told something since the run began.
+    has_judged: bool,
 }
 
 impl ChannelIdentifier {
@@ -122,6 +132,9 @@ impl ChannelIdentifier {
             t_ns: 0,
             moved_s: 0.0,
             alarm: DetectorAlarm::default(),
+            sight: OnsetSight::default(),
+            moves: false,
+            has_judged: false,
         })
     }
 
@@ -138,8 +151,8 @@ impl ChannelIdentifier {
             Entry::Frame(input) => {
                 let outcome = self.observer.push(input.frame);
                 if outcome.new_run || input.frame.run_id != self.run_id {
-                    self.begin_run();
                     self.run_id = input.frame.run_id;
+                    self.begin_run();
                     predicted = self.posterior;
                 }
                 if outcome.complete {
@@ -150,8 +163,14 @@ impl ChannelIdentifier {
                     }
                 }
                 let t_ns = input.frame.header.t_capture_ns;
+                let dt_s = t_ns.saturating_sub(self.t_ns) as f64 * 1e-9;
+                if self.t_ns != 0 {
+                    let watched_s = dt_s.min(STEP_MAX_S);
+                    self.sight
+                        .pass(watched_s, if self.moves { watched_s } else { 0.0 });
+                }
                 if let Some((detection, _)) = input.detection {
-                    self.take(detection, t_ns.saturating_sub(self.t_ns) as f64 * 1e-9);
+                    self.take(detection, dt_s);
                 }
                 self.t_ns = t_ns;
             }
@@ -173,7 +192,16 @@ impl ChannelIdentifier {
         self.posterior = TreeBelief::nominal();
         self.reported.begin_run();
         self.t_ns = 0;
-        self.alarm = DetectorAlarm::default();
+        // An alarm of this run stands on.
+        self.alarm.begin_run(self.run_id);
+        self.sight = OnsetSight::default();
+        self.sight.take(self.alarm.stands());
+        self.has_judged = false;
+    }
+
+    /// False while nothing is known of an alarm that stood before this identifier began.
+    fn is_heard(&self) -> bool {
+        self.has_judged && self.verdict.unknown < NAMED_ELSE || !self.sight.is_short()
     }
 
     /// What the last seconds say of the components.
@@ -221,15 +249,18 @@ impl ChannelIdentifier {
             _ => MODE_UNKNOWN,
         };
         self.verdict = verdict;
+        self.has_judged = true;
     }
 
     fn take(&mut self, detection: &DetectionBelief, dt_s: f64) {
         let moves = detection.readiness == Readiness::Armed as u32 && self.t_ns != 0;
         self.moved_s = if moves { dt_s } else { 0.0 };
+        self.moves = moves;
         self.alarm.take(detection);
+        self.sight.take(self.alarm.stands());
         let mut belief = TreeBelief::watching(self.alarm.p_fault());
         let p_fault = belief.unknown;
-        if !self.alarm.stands() {
+        if !self.alarm.stands() || !self.is_heard() {
             self.posterior = belief;
             return;
         }
@@ -263,7 +294,8 @@ impl ChannelIdentifier {
     fn report(&mut self, predicted: &TreeBelief, belief: &mut FaultBelief) {
         let posterior = &self.posterior;
         let alarm = self.alarm.stands();
-        let (mode, p_mode) = match alarm {
+        let identifies = alarm && self.is_heard();
+        let (mode, p_mode) = match identifies {
             true => posterior.mode(&self.leaves),
             false => (0, posterior.nodes[0]),
         };
@@ -278,8 +310,8 @@ impl ChannelIdentifier {
         belief.reported = self.reported.name();
         belief.p_mode = p_mode;
         belief.alarm_t_capture_ns = if alarm { self.alarm.t_ns() } else { 0 };
-        belief.identifying = u32::from(alarm);
-        if alarm {
+        belief.identifying = u32::from(identifies);
+        if identifies {
             let verdict = &self.verdict;
             belief.onset_t_capture_ns = verdict.onset_ns;
             (belief.size, belief.size_sd) = (verdict.size, verdict.size_sd);

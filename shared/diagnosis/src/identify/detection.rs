@@ -5,6 +5,8 @@ use vigil_checkpoint::CheckpointValue;
 use vigil_robot::learned::{NoiseScales, OutlierRates};
 use vigil_robot::{ChannelMap, DetectorAlarm, Suspects};
 
+use crate::identify::onset_sight::OnsetSight;
+
 /// The last detection that counts.
 #[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 pub struct Detection {
@@ -14,27 +16,32 @@ pub struct Detection {
     pub suspects: Suspects,
     /// How noisy the sensors are.
     pub noise: NoiseScales,
-    has_begun: bool,
-    /// Motion that an identifier which has begun beside an alarm lacks to know as much as another
-    /// one, s.
-    unseen_s: f64,
+    sight: OnsetSight,
 }
 
+/// Probability of faults with a name from which on who has seen little is heard: even odds.
+const NAMED: f64 = 0.5;
+
 impl Detection {
-    /// Takes the next belief, unless an alarm is held against it. An identification knows `ring_s`
-    /// of motion from before its alarm. Scales and rates beyond what a detector reports are those
-    /// of a good sensor. Chosen: a scale of 0.1 and less or 100 and more, a rate of a half and
-    /// more.
-    pub fn take(&mut self, belief: &DetectionBelief, map: &ChannelMap, ring_s: f64) {
-        let is_first = !std::mem::replace(&mut self.has_begun, true);
-        if !self.alarm.take(belief) {
+    /// Goes on in this run, with nothing known but an alarm that stands in it.
+    pub fn begin_run(&mut self, run_id: u64) {
+        self.alarm.begin_run(run_id);
+        *self = Self {
+            alarm: self.alarm,
+            ..Self::default()
+        };
+        self.sight.take(self.alarm.stands());
+    }
+
+    /// Takes the next belief, unless an alarm is held against it. Scales and rates beyond what a
+    /// detector reports are those of a good sensor. Chosen: a scale of 0.1 and less or 100 and
+    /// more, a rate of a half and more.
+    pub fn take(&mut self, belief: &DetectionBelief, map: &ChannelMap) {
+        let is_news = self.alarm.take(belief);
+        self.sight.take(self.alarm.stands());
+        if !is_news {
             return;
         }
-        self.unseen_s = match (self.alarm.stands(), is_first) {
-            (false, _) => 0.0,
-            (true, true) => ring_s,
-            (true, false) => self.unseen_s,
-        };
         let scale = |scale: f64| match scale > 0.1 && scale < 100.0 {
             true => scale,
             false => 1.0,
@@ -57,18 +64,16 @@ impl Detection {
         };
     }
 
-    /// So much motion was observed.
-    pub const fn pass(&mut self, moved_s: f64) {
-        self.unseen_s = (self.unseen_s - moved_s).max(0.0);
+    /// So much time was observed, with so much motion in it.
+    pub fn pass(&mut self, watched_s: f64, moved_s: f64) {
+        self.sight.pass(watched_s, moved_s);
     }
 
-    /// How probable it is at most that nothing is wrong: who has not seen how an alarm began
-    /// believes the detector, until it has seen enough itself.
-    pub fn p_nominal_max(&self) -> f64 {
-        match self.unseen_s > 0.0 {
-            true => 1.0 - self.alarm.p_fault(),
-            false => 1.0,
-        }
+    /// True if what was found is to be told, in which faults with a name have `p_named`. Who has
+    /// not seen how an alarm began finds the robot neither healthy nor inexplicable before it has
+    /// seen enough.
+    pub fn may_tell(&self, p_named: f64) -> bool {
+        p_named > NAMED || !self.sight.is_short()
     }
 }
 
@@ -78,7 +83,7 @@ mod tests {
 
     fn detection(belief: &DetectionBelief) -> Detection {
         let mut detection = Detection::default();
-        detection.take(belief, &map(), 2.0);
+        detection.take(belief, &map());
         detection
     }
 
@@ -136,30 +141,20 @@ mod tests {
     }
 
     #[test]
-    fn who_begins_beside_an_alarm_believes_the_detector_until_it_has_seen_as_much() {
+    fn who_begins_beside_an_alarm_tells_of_faults_alone_before_it_has_seen_enough() {
         let map = map();
-        let belief = |alarm, p_fault| DetectionBelief {
-            alarm,
-            p_fault,
+        let mut found = Detection::default();
+        assert!(found.may_tell(0.0));
+        let belief = DetectionBelief {
+            alarm: 1,
             ..DetectionBelief::default()
         };
-        let mut found = Detection::default();
-        assert_eq!(found.p_nominal_max(), 1.0);
-        for (alarm, p_fault, moved_s, p_max) in [
-            (1, 0.75, 0.0, 0.25),
-            (1, f64::NAN, 1.5, 0.0),
-            (1, 0.5, 0.5, 1.0),
-            (0, 0.5, 0.0, 1.0),
-            (1, 0.75, 0.0, 1.0),
-        ] {
-            found.take(&belief(alarm, p_fault), &map, 2.0);
-            found.pass(moved_s);
-            assert_eq!(found.p_nominal_max(), p_max);
+        for (moved_s, may) in [(0.0, false), (2.5, false), (0.5, true)] {
+            found.take(&belief, &map);
+            found.pass(moved_s, moved_s);
+            assert_eq!(found.may_tell(0.5), may);
+            assert!(found.may_tell(0.51), "a fault is told at once");
         }
-        found = Detection::default();
-        found.take(&belief(1, 0.75), &map, 2.0);
-        found.take(&belief(0, 0.0), &map, 2.0);
-        assert_eq!(found.p_nominal_max(), 1.0, "it has fallen");
     }
 
     #[test]
@@ -173,14 +168,15 @@ mod tests {
         };
         belief.header.epoch = 1;
         belief.noise_scale[0] = 3.0;
-        found.take(&belief, &map, 2.0);
+        found.take(&belief, &map);
         let mut fresh = DetectionBelief::default();
         fresh.header.epoch = 2;
-        found.take(&fresh, &map, 2.0);
+        found.take(&fresh, &map);
         assert!(found.alarm.is_held());
         assert_eq!((found.alarm.p_fault(), found.noise.pose[0]), (0.9, 3.0));
-        fresh.run_id = 5;
-        found.take(&fresh, &map, 2.0);
+        found.begin_run(0);
+        assert_eq!((found.alarm.stands(), found.noise.pose[0]), (true, 1.0));
+        found.begin_run(5);
         assert!(!found.alarm.stands());
     }
 }

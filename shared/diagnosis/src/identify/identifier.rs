@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 use vigil_blocks::{
-    DetectionBelief, Entry, FaultBelief, HealthyBelief, MODE_UNKNOWN, ParticleBlock, SensorFrame,
+    CATCHING_UP, DetectionBelief, Entry, FaultBelief, HealthyBelief, MODE_UNKNOWN, ParticleBlock,
+    SensorFrame,
 };
 use vigil_checkpoint::Checkpoint;
 use vigil_robot::FaultPrior;
@@ -32,9 +33,6 @@ use crate::sensors::Sensors;
 const FURTHER_NEED_HYPOTHESES: &str =
     "leaves steer, pose, torque, current and gyro need identifier.filter = \"multiple-hypothesis\"";
 
-/// A ring is worked off in about this time after an alarm, s. Chosen by hand: the name is two
-/// observations late; smaller makes the first cycles after an alarm the longest ones.
-const CATCH_UP_S: f64 = 0.1;
 /// Observations that the evidence of a diagnosis is summed over at its start, at most. Chosen by
 /// hand: a second of them; more would cost a cycle with a new name more than the filter does.
 const EVIDENCE_MAX: usize = 20;
@@ -79,13 +77,13 @@ pub struct Identifier {
     updated: bool,
     publishes_own: bool,
     ring: Ring,
-    /// Time of an observation, s.
-    interval_s: f64,
     phase: Phase,
     /// Gyro and currents, where they take part: a filter, and what the ring's observations hold.
     #[checkpoint(each)]
     further: Option<Box<FurtherStage>>,
     detection: Detection,
+    /// Enough is known to be reported, since an alarm stands.
+    is_heard: bool,
     posterior: TreeBelief,
     predicted: TreeBelief,
     sizes: NodeSizes,
@@ -153,11 +151,11 @@ impl Identifier {
             updated: false,
             publishes_own: false,
             leaves,
-            ring: Ring::new(capacity),
-            interval_s: model.interval_s,
+            ring: Ring::new(capacity, model.interval_s),
             phase: Phase::Watching,
             further: further.map(Box::new),
             detection: Detection::default(),
+            is_heard: false,
             posterior: TreeBelief::nominal(),
             predicted: TreeBelief::nominal(),
             sizes: NodeSizes::default(),
@@ -227,7 +225,7 @@ impl Identifier {
         self.published.healthy = HealthyBelief::default();
         self.phase = Phase::Watching;
         self.in_trouble = false;
-        self.detection = Detection::default();
+        self.detection.begin_run(self.run_id);
         self.posterior = TreeBelief::nominal();
         self.predicted = self.posterior;
         self.evidence.clear();
@@ -240,19 +238,19 @@ impl Identifier {
     fn take(&mut self, input: &Input<'_>) {
         self.observer.suspect(self.detection.alarm.stands());
         let intake = self.observer.push(input.frame);
+        self.run_id = input.frame.run_id;
         if intake.new_run {
             self.begin_run();
         }
-        self.run_id = input.frame.run_id;
         if let Some((belief, _)) = input.detection {
-            let ring_s = self.ring.capacity() as f64 * self.interval_s;
-            self.detection.take(belief, self.evidence.map(), ring_s);
+            self.detection.take(belief, self.evidence.map());
         }
         if intake.complete {
             self.in_trouble = self.observer.observation().troubles.any(self.use_wheels);
             self.keep(input);
-            self.moved_s += self.observer.observation().moved_s();
-            self.detection.pass(self.observer.observation().moved_s());
+            let observation = self.observer.observation();
+            self.moved_s += observation.moved_s();
+            self.detection.pass(observation.dt_s, observation.moved_s());
         }
         if self.in_trouble {
             self.phase = Phase::Watching;
@@ -275,6 +273,10 @@ impl Identifier {
         }
         if let Phase::Identifying(next) = self.phase {
             self.identify(next, intake.complete);
+            if !self.is_heard {
+                self.posterior = TreeBelief::watching(self.detection.alarm.p_fault());
+                self.evidence.clear();
+            }
         }
     }
 
@@ -297,7 +299,7 @@ impl Identifier {
         if let Phase::Identifying(next) = self.phase
             && gave_way
         {
-            // An observation that nobody has taken is taken before it goes; see catch_up.
+            // An observation that nobody has taken is taken before it goes; see Ring::catch_up.
             self.phase = Phase::Identifying(next.saturating_sub(1));
         }
     }
@@ -324,9 +326,7 @@ impl Identifier {
         }
         self.phase = Phase::Identifying(start + 1);
         self.sizes = NodeSizes::default();
-        for belief in [&mut self.posterior, &mut self.predicted] {
-            belief.cap_nominal(self.detection.p_nominal_max());
-        }
+        self.is_heard = self.detection.may_tell(0.0);
         // What was unknown so far is any of the faults, by their priors.
         self.predicted = self.predicted.divided(&self.leaves, self.p_unknown);
     }
@@ -334,7 +334,8 @@ impl Identifier {
     fn identify(&mut self, next: usize, complete: bool) {
         let behind = self.ring.len().saturating_sub(next);
         let was_behind = behind > usize::from(complete);
-        let allowed = if was_behind { self.catch_up() } else { 1 };
+        let frame_s = self.observer.observation().frame_s;
+        let allowed = self.ring.catch_up(frame_s, was_behind);
         let taken = behind.min(allowed);
         let mut moved_s = 0.0;
         for i in next..next + taken {
@@ -363,9 +364,12 @@ impl Identifier {
         let fusion = self.further.as_ref().map(|further| further.fusion());
         self.engine
             .posterior(&self.leaves, fusion.as_ref(), &mut self.posterior);
-        self.posterior.cap_nominal(self.detection.p_nominal_max());
+        let p_named = 1.0 - self.posterior.nodes[0] - self.posterior.unknown;
+        self.is_heard = self.detection.may_tell(p_named);
         self.sizes = self.engine.sizes(&self.leaves, &self.posterior);
-        self.explain(next, next + taken);
+        if self.is_heard {
+            self.explain(next, next + taken);
+        }
         self.updated = true;
     }
 
@@ -410,34 +414,26 @@ impl Identifier {
         }
     }
 
-    /// Observations to work off in one cycle while behind: more than arrive.
-    fn catch_up(&self) -> usize {
-        let frame_s = self.observer.observation().frame_s;
-        let arriving = frame_s / self.interval_s;
-        let wanted = (self.ring.capacity() as f64 * frame_s / CATCH_UP_S).ceil() as usize;
-        wanted.max(arriving as usize + 1).min(self.ring.capacity())
-    }
-
     fn is_catching_up(&self) -> bool {
         matches!(self.phase, Phase::Identifying(next) if next < self.ring.len())
     }
 
     fn report(&mut self, belief: &mut FaultBelief) {
         self.posterior.write(&self.leaves, belief);
-        match self.phase {
-            Phase::Identifying(_) => self.sizes.write(belief),
-            Phase::Watching if self.in_trouble => self.sizes.write(belief),
-            Phase::Watching => NodeSizes::default().write(belief),
+        match self.is_watching() && !self.in_trouble {
+            true => NodeSizes::default().write(belief),
+            false => self.sizes.write(belief),
         }
         belief.p_predicted = self.predicted.nodes;
         belief.p_unknown_predicted = self.predicted.unknown;
         belief.run_id = self.run_id;
-        let (mode, p_mode) = match self.phase {
-            _ if self.in_trouble => self.posterior.mode(&self.leaves),
-            Phase::Watching => (0, self.posterior.nodes[0]),
-            Phase::Identifying(_) if self.is_catching_up() => (self.mode, belief.p[0]),
-            Phase::Identifying(_) => self.posterior.mode(&self.leaves),
+        let (identifying, (mode, p_mode)) = match () {
+            () if self.in_trouble => (1, self.posterior.mode(&self.leaves)),
+            () if self.is_watching() => (0, (0, self.posterior.nodes[0])),
+            () if self.is_catching_up() => (CATCHING_UP, (self.mode, belief.p[0])),
+            () => (1, self.posterior.mode(&self.leaves)),
         };
+        belief.identifying = identifying;
         if mode != self.mode {
             self.mode = mode;
             self.mode_changes = self.mode_changes.saturating_add(1);
@@ -453,7 +449,6 @@ impl Identifier {
         let alarm = &self.detection.alarm;
         belief.alarm_t_capture_ns = if alarm.stands() { alarm.t_ns() } else { 0 };
         belief.onset_t_capture_ns = self.onset();
-        belief.identifying = u32::from(self.phase != Phase::Watching || self.in_trouble);
         belief.runner_up = self.evidence.runner_up();
         belief.channel_evidence = self.evidence.channel_evidence();
         belief.degenerate_count = self.engine.degenerate_count();
@@ -464,8 +459,13 @@ impl Identifier {
         }
     }
 
+    /// Nothing is identified, or not enough is known of it.
+    fn is_watching(&self) -> bool {
+        self.phase == Phase::Watching || !self.is_heard
+    }
+
     fn onset(&self) -> u64 {
-        if self.phase == Phase::Watching || self.is_catching_up() {
+        if self.is_watching() || self.is_catching_up() {
             return 0;
         }
         self.onset_of_leaf()

@@ -24,6 +24,7 @@ mod leaf_map;
 mod models;
 mod multiple_hypothesis;
 mod node_sizes;
+mod onset_sight;
 mod phase;
 mod rate_offsets;
 mod reported;

@@ -7,6 +7,10 @@ use vigil_robot::learned::{Healthy, NoiseScales, Observation};
 
 use crate::invariants::{self, RingPlace};
 
+/// A ring is worked off in about this time after an alarm, s. Chosen by hand: the name is two
+/// observations late; smaller makes the first cycles after an alarm the longest ones.
+const CATCH_UP_S: f64 = 0.1;
+
 /// An observation kept for an identification, and what the detector believed after it.
 #[derive(Debug, Clone, Copy, CheckpointValue)]
 pub(crate) struct RingEntry {
@@ -35,23 +39,31 @@ impl RingEntry {
 pub(crate) struct Ring {
     entries: VecDeque<RingEntry>,
     capacity: usize,
+    /// Time of an entry, s.
+    interval_s: f64,
     /// Newest time of the run so far, ns: a clock that is set back leaves onsets behind it.
     newest_ns: u64,
 }
 
 impl Ring {
-    /// An empty ring.
-    pub(crate) fn new(capacity: usize) -> Self {
+    /// An empty ring of so many entries, each of `interval_s` of motion.
+    pub(crate) fn new(capacity: usize, interval_s: f64) -> Self {
         Self {
             entries: VecDeque::with_capacity(capacity),
             capacity,
+            interval_s,
             newest_ns: 0,
         }
     }
 
-    /// Entries that it holds at most.
-    pub(crate) const fn capacity(&self) -> usize {
-        self.capacity
+    /// Entries to work off in a cycle of `frame_s`: one, or while behind more than arrive.
+    pub(crate) fn catch_up(&self, frame_s: f64, is_behind: bool) -> usize {
+        if !is_behind {
+            return 1;
+        }
+        let arriving = frame_s / self.interval_s;
+        let wanted = (self.capacity as f64 * frame_s / CATCH_UP_S).ceil() as usize;
+        wanted.max(arriving as usize + 1).min(self.capacity)
     }
 
     /// Entries that it holds.
@@ -131,7 +143,7 @@ mod tests {
 
     #[test]
     fn the_oldest_gives_way_and_the_newest_time_stays() {
-        let mut ring = Ring::new(3);
+        let mut ring = Ring::new(3, 0.05);
         let full: Vec<bool> = (1..=5).map(|t_ns| ring.push(entry(t_ns, 0))).collect();
         assert_eq!(full, [false, false, false, true, true]);
         assert_eq!((times(&ring), ring.newest_ns()), (vec![3, 4, 5], 5));
@@ -140,12 +152,20 @@ mod tests {
         ring.push(back);
         assert_eq!((times(&ring), ring.newest_ns()), (vec![4, 5, 2], 5));
         ring.clear();
-        assert_eq!((ring.len(), ring.newest_ns(), ring.capacity()), (0, 0, 3));
+        assert_eq!((ring.len(), ring.newest_ns()), (0, 0));
+    }
+
+    #[test]
+    fn what_waits_is_worked_off_within_a_tenth_of_a_second() {
+        let ring = Ring::new(40, 0.05);
+        let taken = |frame_s, is_behind| ring.catch_up(frame_s, is_behind);
+        assert_eq!([taken(0.01, false), taken(0.01, true)], [1, 4]);
+        assert_eq!([taken(0.0, true), taken(9.0, true)], [1, 40]);
     }
 
     #[test]
     fn an_identification_starts_where_the_pose_is_known() {
-        let mut ring = Ring::new(8);
+        let mut ring = Ring::new(8, 0.05);
         assert_eq!(ring.start(), 0);
         ring.push(entry(1, 0));
         assert_eq!(ring.start(), 0);
@@ -156,7 +176,7 @@ mod tests {
 
     #[test]
     fn the_last_entry_by_an_instant_is_found_within_the_range() {
-        let mut ring = Ring::new(8);
+        let mut ring = Ring::new(8, 0.05);
         for t_ns in [10, 20, 30, 40] {
             ring.push(entry(t_ns, 0));
         }
@@ -175,7 +195,7 @@ mod tests {
     #[test]
     #[should_panic(expected = "the ring holds one run")]
     fn an_entry_of_another_run_ends_the_process() {
-        let mut ring = Ring::new(3);
+        let mut ring = Ring::new(3, 0.05);
         ring.push(entry(1, 0));
         ring.push(RingEntry {
             run_id: 2,
@@ -186,7 +206,7 @@ mod tests {
     #[test]
     #[should_panic(expected = "no more are kept than the capacity")]
     fn a_ring_that_holds_more_than_its_capacity_ends_the_process() {
-        let mut ring = Ring::new(3);
+        let mut ring = Ring::new(3, 0.05);
         ring.push(entry(1, 0));
         ring.push(entry(2, 0));
         ring.capacity = 1;

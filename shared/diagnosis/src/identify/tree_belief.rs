@@ -91,25 +91,6 @@ impl TreeBelief {
         self
     }
 
-    /// Nominal with `p_max` at most; what it loses is unknown. Not a number is no bound.
-    pub fn cap_nominal(&mut self, p_max: f64) {
-        let excess = self.nodes[0] - p_max;
-        if excess.is_nan() || excess <= 0.0 {
-            return;
-        }
-        self.entropy -= entropy(self.nodes[0]) + entropy(self.unknown);
-        self.nodes[0] -= excess;
-        self.unknown += excess;
-        self.entropy += entropy(self.nodes[0]) + entropy(self.unknown);
-        let (sets, count) = (self.sets, std::mem::take(&mut self.set_count));
-        for mut set in sets.into_iter().take(count) {
-            if set.leaves == 0 {
-                set.p = self.nodes[0];
-            }
-            rank(&mut self.sets, &mut self.set_count, set);
-        }
-    }
-
     /// Nodes and unknown after `birth` of the mass without a fault went to it by its prior, and
     /// `death` of each fault's mass lost it.
     #[must_use]
@@ -210,31 +191,6 @@ mod tests {
         }
         out.unknown = unknown;
         out
-    }
-
-    #[test]
-    fn what_nominal_loses_is_unknown() {
-        let mut belief = TreeBelief::nominal();
-        belief.clear();
-        for (bits, p) in [(0, 0.75), (0b100, 0.25)] {
-            let set = FaultSet { leaves: bits, p };
-            belief.add(set, &leaves());
-        }
-        for bound in [1.0, 0.75, f64::NAN] {
-            belief.cap_nominal(bound);
-            assert_eq!((belief.nodes[0], belief.unknown), (0.75, 0.0));
-        }
-        belief.cap_nominal(0.125);
-        assert_eq!((belief.nodes[0], belief.unknown), (0.125, 0.625));
-        let sets = belief.sets.map(|set| (set.leaves, set.p));
-        assert_eq!(
-            (belief.set_count, &sets[..2]),
-            (2, &[(0b100, 0.25), (0, 0.125)][..])
-        );
-        is(
-            belief.entropy,
-            entropy(0.125) + entropy(0.25) + entropy(0.625),
-        );
     }
 
     #[test]

@@ -5,9 +5,10 @@ mod python;
 
 use vigil_blocks::layout::{Field, Layout};
 use vigil_blocks::{
-    Action, ActionOutcome, Block, Cause, CauseKind, ControlMode, DetectionBelief, Event,
-    FaultBelief, FaultRecord, FaultSet, Faults, Header, Health, HealthyBelief, ParticleBlock,
-    RecoveryKind, SensorFrame, SizeKind, Symptoms, Truth, Verdict, WeightedHypothesis,
+    Action, ActionOutcome, Block, CATCHING_UP, Carryover, Cause, CauseKind, ControlMode,
+    DetectionBelief, Event, FaultBelief, FaultRecord, FaultSet, Faults, Header, Health,
+    HealthyBelief, ParticleBlock, RecoveryKind, SensorFrame, SizeKind, Symptoms, Truth, Verdict,
+    WeightedHypothesis,
 };
 
 pub use c::header;
@@ -48,6 +49,7 @@ fn structs() -> Vec<Struct> {
         part::<WeightedHypothesis>(),
         part::<Event>(),
         part::<FaultRecord>(),
+        part::<Carryover>(),
         block::<SensorFrame>(),
         block::<DetectionBelief>(),
         block::<ParticleBlock>(),
@@ -103,6 +105,8 @@ fn constants() -> Vec<(&'static str, String, u64)> {
     all.extend(sizes.map(|(name, value)| ("SIZE", upper(&name), value)));
     let causes = [("FRAME", CauseKind::Frame), ("MISSED", CauseKind::Missed)];
     all.extend(causes.map(|(name, value)| ("CAUSE", name.to_owned(), value as u64)));
+    let name = "CATCHING_UP".to_owned();
+    all.push(("IDENTIFYING", name, u64::from(CATCHING_UP)));
     all
 }
 

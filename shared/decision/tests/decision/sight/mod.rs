@@ -1,7 +1,8 @@
 //! What the supervisor does about blindness, arming and odds before an alarm, and what it fuses.
 
 use vigil_blocks::{
-    Blindness, CauseKind, ControlMode, DetectionBelief, Entry, FaultBelief, Readiness, RecoveryKind,
+    Blindness, CATCHING_UP, Carryover, CauseKind, ControlMode, DetectionBelief, Entry, FaultBelief,
+    Readiness, RecoveryKind,
 };
 use vigil_decision::Inputs;
 
@@ -38,6 +39,36 @@ impl Stages {
         (self.diagnosis.p[0], self.diagnosis.p_unknown) = (1.0 - p, p);
         self.diagnosis.p_predicted = self.diagnosis.p;
         self.diagnosis.p_unknown_predicted = p;
+        self.diagnosis.identifying = 1;
+    }
+
+    /// The detector's alarm stands, and the identifier holds this leaf for the cause.
+    fn named(&mut self, leaf: &str) {
+        self.p_fault(0.99);
+        self.detection.alarm = 1;
+        self.detection.alarm_t_capture_ns = 7;
+        let node = self.world.tree.index(leaf).unwrap();
+        self.diagnosis.p[node] = std::mem::take(&mut self.diagnosis.p_unknown);
+        self.diagnosis.p_predicted = self.diagnosis.p;
+    }
+
+    /// An identifier that has just begun: it knows no more than the detector.
+    fn replaced(&mut self) {
+        self.diagnosis.p.fill(0.0);
+        self.p_fault(0.99);
+        self.detection.alarm = 1;
+        self.detection.alarm_t_capture_ns = 7;
+        self.diagnosis.identifying = 0;
+    }
+
+    /// A supervisor that goes on from what this one leaves.
+    fn succeed(&mut self) -> Carryover {
+        let left = self.world.supervisor.carryover();
+        let t_ns = self.world.t_ns;
+        self.world = World::new();
+        self.world.t_ns = t_ns;
+        self.world.supervisor.restore(&left, None);
+        left
     }
 
     fn cycles(&mut self, count: u32) {
@@ -168,8 +199,240 @@ fn a_diagnosis_of_nothing_ends_the_alarm_and_another_alarm_begins_anew() {
     stages.detection.readiness = Readiness::Armed as u32;
     stages.cycles(10);
     assert_eq!(stages.world.action.alarm, 0);
-    stages.detection.alarm_count = 2;
+    (
+        stages.detection.alarm_count,
+        stages.detection.alarm_t_capture_ns,
+    ) = (2, 9);
     stages.cycles(1);
     assert_eq!(stages.world.action.alarm, 1);
     assert_eq!(stages.world.action.alarm_count, 2);
+}
+
+#[test]
+fn while_an_identifier_that_was_replaced_knows_nothing_what_was_believed_stands() {
+    let mut stages = Stages::new();
+    stages.named("RM_STUCK");
+    stages.cycles(100);
+    assert_eq!(stages.world.kind(), RecoveryKind::Compensate);
+    for _ in 0..10 {
+        stages.replaced();
+        for _ in 0..100 {
+            stages.cycles(1);
+            assert_eq!(stages.world.kind(), RecoveryKind::Compensate);
+            assert_eq!(stages.world.supervisor.latched(), None);
+            assert!(!stages.world.supervisor.hears_identifier());
+        }
+    }
+    stages.named("RM_STUCK");
+    stages.cycles(10);
+    assert_eq!(stages.world.kind(), RecoveryKind::Compensate);
+    assert!(stages.world.supervisor.hears_identifier());
+}
+
+#[test]
+fn nobody_is_called_before_an_identifier_that_has_just_begun_had_time_to_see() {
+    let mut stages = Stages::new();
+    stages.cycles(50);
+    stages.replaced();
+    // One that is late is not lost.
+    stages.cycles(2);
+    assert_eq!(stages.world.kind(), RecoveryKind::GoOn);
+    for cycle in 0..490 {
+        stages.cycles(1);
+        assert_eq!(stages.world.kind(), RecoveryKind::SlowDown, "{cycle}");
+        assert_eq!(stages.world.supervisor.latched(), None);
+    }
+    stages.named("RM_STUCK");
+    stages.cycles(1);
+    assert_eq!(stages.world.kind(), RecoveryKind::Compensate);
+    stages.detection.alarm = 0;
+    stages.p_fault(0.0);
+    stages.cycles(100);
+    // One that never sees anything is not waited for.
+    let mut stages = Stages::new();
+    stages.replaced();
+    stages.cycles(510);
+    assert_eq!(stages.world.kind(), RecoveryKind::CallForHelp);
+    assert!(stages.world.supervisor.latched().is_some());
+}
+
+#[test]
+fn a_call_for_help_stands_for_the_next_supervisor_and_is_no_other_alarm() {
+    let mut stages = Stages::new();
+    stages.p_fault(0.99);
+    (stages.detection.alarm, stages.detection.alarm_t_capture_ns) = (1, 7);
+    stages.cycles(10);
+    let called = stages.world.supervisor.latched();
+    assert!(called.is_some());
+    let left = stages.succeed();
+    assert_eq!((left.latched(), left.alarm_count), (called, 1));
+    assert_eq!(stages.world.supervisor.latched(), called);
+    assert_eq!(stages.world.supervisor.carryover(), left);
+    // Nothing is heard yet: it stands still.
+    let world = &mut stages.world;
+    world.supervisor.step(Entry::Missed(1), &mut world.action);
+    assert_eq!(world.kind(), RecoveryKind::Stop);
+    for _ in 0..3 {
+        stages.cycles(10);
+        assert_eq!(stages.world.kind(), RecoveryKind::CallForHelp);
+        assert_eq!(stages.world.action.alarm_count, 1);
+        // A robot that stands looks healthy.
+        (stages.detection.alarm, stages.detection.alarm_t_capture_ns) = (0, 0);
+        stages.p_fault(0.0);
+    }
+    // A new run releases it, and nothing of it is left for a supervisor in the next one.
+    stages.detection.run_id = 5;
+    stages.diagnosis.run_id = 5;
+    stages.cycles(10);
+    assert_eq!(stages.world.kind(), RecoveryKind::GoOn);
+    assert_eq!(stages.succeed().latched(), None);
+    stages.cycles(1);
+    assert_eq!(stages.world.kind(), RecoveryKind::GoOn);
+}
+
+#[test]
+fn what_stood_for_another_decision_model_or_run_does_not_stand() {
+    let mut stages = Stages::new();
+    stages.p_fault(0.99);
+    (stages.detection.alarm, stages.detection.alarm_t_capture_ns) = (1, 7);
+    stages.cycles(10);
+    let mut left = stages.succeed();
+    left.model_hash ^= 1;
+    stages.world = World::new();
+    stages.world.supervisor.restore(&left, None);
+    assert_eq!(stages.world.supervisor.latched(), None);
+    left.model_hash ^= 1;
+    left.latched = u32::MAX;
+    stages.world.supervisor.restore(&left, None);
+    assert_eq!(stages.world.supervisor.latched(), None);
+    stages.succeed();
+    (stages.detection.run_id, stages.diagnosis.run_id) = (5, 5);
+    (stages.detection.alarm, stages.detection.alarm_t_capture_ns) = (0, 0);
+    stages.p_fault(0.0);
+    stages.cycles(1);
+    assert_eq!(stages.world.kind(), RecoveryKind::GoOn);
+}
+
+#[test]
+fn a_supervisor_that_is_replaced_beside_an_alarm_stands_until_it_hears_and_calls_nobody() {
+    let mut stages = Stages::new();
+    stages.named("RM_STUCK");
+    stages.cycles(100);
+    let left = stages.succeed();
+    assert_eq!((left.detected_t_capture_ns, left.latched()), (7, None));
+    let world = &mut stages.world;
+    world.supervisor.step(Entry::Missed(1), &mut world.action);
+    assert_eq!((world.kind(), world.action.alarm), (RecoveryKind::Stop, 1));
+    for _ in 0..100 {
+        stages.cycles(1);
+        assert_eq!(stages.world.kind(), RecoveryKind::Compensate);
+    }
+    assert_eq!(stages.world.supervisor.latched(), None);
+    assert_eq!(stages.world.action.alarm_count, 1);
+    // Detector, identifier and supervisor are new.
+    stages.succeed();
+    stages.replaced();
+    stages.detection.header.epoch = 9;
+    (stages.detection.alarm, stages.detection.alarm_t_capture_ns) = (0, 0);
+    stages.detection.readiness = Readiness::Arming as u32;
+    stages.cycles(2);
+    assert_eq!(stages.world.kind(), RecoveryKind::Stop);
+    stages.cycles(300);
+    assert_eq!(stages.world.kind(), RecoveryKind::SlowDown);
+    assert_eq!(stages.world.supervisor.latched(), None);
+    stages.named("RM_STUCK");
+    stages.detection.readiness = Readiness::Armed as u32;
+    stages.cycles(1);
+    assert_eq!(stages.world.kind(), RecoveryKind::Compensate);
+    assert_eq!(stages.world.action.alarm_count, 1);
+}
+
+#[test]
+fn what_was_told_is_believed_until_the_new_identifier_is_heard() {
+    let mut stages = Stages::new();
+    stages.named("RM_STUCK");
+    stages.cycles(100);
+    let left = stages.world.supervisor.carryover();
+    let told = stages.diagnosis;
+    stages.world = World::new();
+    stages.world.supervisor.restore(&left, Some(&told));
+    stages.replaced();
+    stages.cycles(2);
+    assert_eq!(stages.world.kind(), RecoveryKind::Stop);
+    for _ in 0..1000 {
+        stages.cycles(1);
+        assert_eq!(stages.world.kind(), RecoveryKind::Compensate);
+    }
+    assert_eq!(stages.world.supervisor.latched(), None);
+    // It was wrong, or the fault has gone.
+    stages.p_fault(0.01);
+    stages.detection.alarm = 0;
+    stages.cycles(300);
+    assert_eq!(stages.world.kind(), RecoveryKind::GoOn);
+}
+
+#[test]
+fn a_doubt_in_the_first_words_of_a_new_identifier_calls_nobody() {
+    let mut stages = Stages::new();
+    stages.named("RM_STUCK");
+    stages.cycles(100);
+    stages.replaced();
+    stages.cycles(5);
+    stages.named("RM_STUCK");
+    let node = stages.world.tree.index("RM_STUCK").unwrap();
+    stages.diagnosis.p[node] = 0.3;
+    (stages.diagnosis.p[0], stages.diagnosis.p_unknown) = (0.3, 0.4);
+    stages.cycles(10);
+    assert!(stages.world.supervisor.hears_identifier());
+    assert_eq!(stages.world.supervisor.latched(), None);
+    stages.named("RM_STUCK");
+    stages.cycles(10);
+    assert_eq!(stages.world.kind(), RecoveryKind::Compensate);
+}
+
+#[test]
+fn before_its_first_result_about_an_alarm_an_identifier_changes_nothing() {
+    let mut stages = Stages::new();
+    stages.named("RM_STUCK");
+    stages.cycles(100);
+    stages.diagnosis.p.fill(0.0);
+    stages.p_fault(0.1);
+    stages.diagnosis.identifying = CATCHING_UP;
+    stages.cycles(20);
+    assert_eq!(stages.world.kind(), RecoveryKind::Compensate);
+    assert!(stages.world.belief("RM_STUCK") > 0.9);
+    stages.diagnosis.identifying = 1;
+    stages.cycles(100);
+    assert_eq!(stages.world.kind(), RecoveryKind::GoOn);
+}
+
+#[test]
+fn misses_beside_an_alarm_call_nobody_at_once() {
+    let mut stages = Stages::new();
+    stages.cycles(50);
+    stages.p_fault(0.99);
+    (stages.detection.alarm, stages.detection.alarm_t_capture_ns) = (1, 7);
+    let world = &mut stages.world;
+    world.supervisor.step(Entry::Missed(3), &mut world.action);
+    stages.detection.header.t_capture_ns = world.t_ns + CYCLE_NS;
+    let inputs = Inputs {
+        diagnosis: None,
+        detection: Some(&stages.detection),
+    };
+    world
+        .supervisor
+        .step(Entry::Frame(inputs), &mut world.action);
+    assert_eq!(world.kind(), RecoveryKind::SlowDown);
+    assert_eq!(world.supervisor.latched(), None);
+}
+
+#[test]
+fn what_is_best_is_done_at_once_after_a_restart_however_little_it_gains() {
+    let mut stages = Stages::new();
+    stages.named("LF_ENC");
+    stages.cycles(100);
+    assert_eq!(stages.world.kind(), RecoveryKind::IgnoreEncoder);
+    stages.succeed();
+    stages.cycles(1);
+    assert_eq!(stages.world.kind(), RecoveryKind::IgnoreEncoder);
 }

@@ -69,5 +69,6 @@ fn an_onset_after_the_newest_observation_ends_the_process() {
         identifier.posterior.nodes[encoder] = 1.0;
         identifier.engine.restart(&identifier.unsure, 5);
         identifier.phase = Phase::Identifying(0);
+        identifier.is_heard = true;
     });
 }
