@@ -8,7 +8,7 @@ use super::scenario::Scenario;
 use crate::has_percentile;
 
 /// Figures that stand in the table even where no bar asks for them; the others are in the document.
-const SHOWN: [&str; 26] = [
+const SHOWN: [&str; 29] = [
     "detected",
     "delay_p50_s",
     "delay_p95_s",
@@ -32,6 +32,9 @@ const SHOWN: [&str; 26] = [
     "actions_per_h",
     "blind_stops_per_h",
     "help_latched",
+    "faults_told",
+    "told_without_alarm",
+    "faults_pending",
     "contradiction_s",
     "ece",
     "log_score_2s",

@@ -1,9 +1,9 @@
 //! The stages of a run, scored.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::error::Error;
 
-use vigil_blocks::{FaultSource, Readiness, SensorFrame};
+use vigil_blocks::{FaultSource, FaultState, Faults, Readiness, SensorFrame};
 use vigil_decision::{FaultLife, LifeInput};
 use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Verdict;
@@ -25,9 +25,18 @@ pub(super) struct Watch<'a> {
 /// What an operator is told of the robot's faults.
 struct ToldFaults {
     life: FaultLife,
-    /// By number, how often each became active.
+    /// By number, how often each of the robot became active.
     activations: BTreeMap<u64, u32>,
+    /// Faults that were told of, of whatever.
+    told: BTreeSet<u64>,
+    /// When the alarm stood last, s.
+    alarm_t_s: f64,
+    /// Faults that became active without it.
+    without_alarm: usize,
 }
+
+/// An alarm that has fallen explains what becomes active within this time, s.
+const FALLEN_S: f64 = 1.0;
 
 impl ToldFaults {
     fn take(&mut self, t_s: f64, stages: &Stages) {
@@ -38,12 +47,26 @@ impl ToldFaults {
             decided: stages.action().into(),
             silent_services: 0,
         });
+        if stages.action().alarm != 0 {
+            self.alarm_t_s = t_s;
+        }
         while let Some(record) = self.life.take_change() {
+            self.told.insert(record.number);
             // That frames are missing is for other figures.
             if record.source == FaultSource::Robot as u32 {
                 self.activations.insert(record.number, record.count);
+                let is_new = record.state() == Some(FaultState::Active);
+                let has_alarm = t_s - self.alarm_t_s <= FALLEN_S;
+                self.without_alarm += usize::from(is_new && !has_alarm);
             }
         }
+    }
+
+    /// Faults that were gone before they were told of.
+    fn pending_alone(&self) -> usize {
+        let mut block = Box::<Faults>::default();
+        self.life.write(&mut block, 0);
+        (block.fault_count as usize).saturating_sub(self.told.len())
     }
 }
 
@@ -66,6 +89,9 @@ impl<'a> Watch<'a> {
             told: ToldFaults {
                 life: vigil_supervisor::fault_life(setup)?,
                 activations: BTreeMap::new(),
+                told: BTreeSet::new(),
+                alarm_t_s: f64::NEG_INFINITY,
+                without_alarm: 0,
             },
         })
     }
@@ -74,6 +100,8 @@ impl<'a> Watch<'a> {
     pub(super) fn finish(self) -> Run {
         Run {
             faults_told: self.told.activations.len(),
+            told_without_alarm: self.told.without_alarm,
+            faults_pending: self.told.pending_alone(),
             activations: self.told.activations.values().sum::<u32>() as usize,
             ..self.scorer.finish()
         }

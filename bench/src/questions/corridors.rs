@@ -22,11 +22,11 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 500)]
     missions: u64,
     /// Decision model of Vigil instead of that of `config/corridor-people.toml`.
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "FILE")]
     decision: Option<String>,
     /// Drive Vigil alone, and write the steps of its decision model with their true states to this
     /// file, for `vigil pomdp fit` and `learn`.
-    #[arg(long, value_name = "F", conflicts_with_all = ["sweep", "vary", "json"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["sweep", "vary", "json"])]
     record: Option<PathBuf>,
     /// Share of the decisions that are recorded in which something else is tried.
     #[arg(long, value_name = "P", default_value_t = 0.3, value_parser = share, requires = "record")]

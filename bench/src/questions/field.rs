@@ -24,7 +24,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     only: Vec<String>,
     /// Factor on the number of runs; at least one of each scenario stays.
-    #[arg(long, value_name = "F", default_value_t = 1.0)]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     scale: f64,
     /// Of each scenario only the run with this number, and print whatever changes in it.
     #[arg(long, value_name = "RUN", conflicts_with_all = ["archive", "scale"])]
@@ -45,7 +45,7 @@ pub struct Args {
     #[arg(long)]
     check: bool,
     /// Other scenarios.
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "FILE")]
     scenarios: Option<PathBuf>,
 }
 

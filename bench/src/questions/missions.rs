@@ -21,11 +21,11 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 300)]
     per_kind: u64,
     /// Graph of Vigil; of `config/` if the path is relative.
-    #[arg(long, value_name = "F", default_value = "rover.toml")]
+    #[arg(long, value_name = "FILE", default_value = "rover.toml")]
     config: PathBuf,
     /// Drive Vigil alone, and write the evidence of its decisions with what was true to this file,
     /// for `vigil pomdp fit`.
-    #[arg(long, value_name = "F", conflicts_with_all = ["sweep", "vary", "json"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["sweep", "vary", "json"])]
     record: Option<PathBuf>,
     /// Share of the alarms that are recorded after which something else is tried.
     #[arg(long, value_name = "P", default_value_t = 0.5, value_parser = share, requires = "record")]

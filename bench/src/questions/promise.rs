@@ -30,7 +30,7 @@ pub struct Args {
     #[arg(long, value_name = "H", default_value_t = 1000.0)]
     hours: f64,
     /// Factor on the number of runs of each scenario; 0: only the law.
-    #[arg(long, value_name = "F", default_value_t = 1.0)]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     scale: f64,
     /// Only scenarios whose names begin with one of these.
     #[arg(long, value_name = "NAME", value_delimiter = ',')]

@@ -219,6 +219,13 @@ fn of_health(runs: &[Run]) -> Vec<Figure> {
         rate("alarms", runs, |run| run.alarms, one),
         rate("alarms_per_h", runs, |run| run.alarms, hours),
         rate("faults_told", runs, |run| run.faults_told, one),
+        rate(
+            "told_without_alarm",
+            runs,
+            |run| run.told_without_alarm,
+            one,
+        ),
+        rate("faults_pending", runs, |run| run.faults_pending, one),
         share("runs_with_alarm", runs, alarmed, false),
         share_of_time(
             "alarm_share",

@@ -145,6 +145,10 @@ pub struct Run {
     pub faults_told: usize,
     /// How often one of them became active.
     pub activations: usize,
+    /// How often one of them became active while no alarm stood.
+    pub told_without_alarm: usize,
+    /// Faults that were gone before an operator was told of them.
+    pub faults_pending: usize,
 }
 
 /// Scores one run while it goes on.
