@@ -25,7 +25,7 @@ pub const DOCUMENTS: [&str; 7] = [
 ];
 /// A command that hangs is ended after this long; no test passes or fails by its duration.
 const WATCHDOG: Duration = Duration::from_secs(120);
-/// Further tries of a run in which the simulator has missed cycles.
+/// Further tries of a run in which a service has missed cycles.
 const RETRIES: usize = 2;
 /// Duration of a graph of which no lines are awaited, s.
 const SHORT_S: &str = "2";
@@ -144,9 +144,10 @@ impl Process {
         }
     }
 
-    /// True if the simulator missed a cycle: its noise is another then, and so is the drive.
+    /// True if a service missed a cycle: the simulator's noise is another then, and so is the
+    /// drive; what comes late is told in another order, or not at all.
     fn has_missed(&self) -> bool {
-        let is_miss = |line: &String| shape(line).contains("sensor-sim miss");
+        let is_miss = |line: &String| line.split_whitespace().nth(4) == Some("miss");
         self.printed.iter().any(is_miss)
     }
 
@@ -155,8 +156,8 @@ impl Process {
         self.expect_unless_missed(place, shown, false);
     }
 
-    /// The same; or else, if that `may_miss`, until the end of a run in which the simulator has
-    /// missed a cycle. False then.
+    /// The same; or else, if that `may_miss`, until the end of a run in which a service has missed
+    /// a cycle. False then.
     fn expect_unless_missed(&mut self, place: &str, shown: &[String], may_miss: bool) -> bool {
         let started = Instant::now();
         let mut is_open = true;
@@ -307,7 +308,7 @@ impl Follower<'_> {
             let is_awaited = index + 1 == commands.len() && !shown.is_empty();
             let mut process = self.start(block, command, is_awaited);
             if is_awaited {
-                // On a loaded machine the simulator misses cycles: another try may miss none.
+                // On a loaded machine services miss cycles: another try may miss none.
                 for _ in 0..RETRIES {
                     if process.expect_unless_missed(&place, shown, true) {
                         break;

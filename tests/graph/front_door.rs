@@ -228,6 +228,11 @@ fn a_name_that_does_not_run_is_said_and_leaves_nothing_behind() {
         &["clear"],
         &["inject", "stuck:RM"],
         &["run", "--adopt"],
+        &["status"],
+        &["top", "--once"],
+        &["top", "--line"],
+        &["snapshot"],
+        &["recordings"],
     ] {
         let output = vigil(&[words, &["--graph", &name]].concat());
         assert!(!output.status.success(), "{words:?}");

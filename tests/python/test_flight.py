@@ -133,6 +133,7 @@ class BlackBox(unittest.TestCase):
             self.assertEqual(said.strip(), str(self.folder / graph.name))
             path, *_ = wait_for(lambda: self.recordings("request"), "a recording")
             listed = json.loads(vigil("recordings", "--json", "--graph", graph.name).stdout)
+            self.assertEqual(problems("recordings", listed), [])
             self.assertEqual(listed["folder"], str(self.folder / graph.name))
             self.assertIn(path.name, [one["name"] for one in listed["recordings"]])
             graph.stop()

@@ -1,15 +1,27 @@
 """What the commands print with --json is what their published schemas say, and nothing else."""
 
+import contextlib
 import gzip
 import json
 import math
 import pathlib
 import random
+import subprocess
 import tempfile
 import unittest
 
-from harness import FRAMES, Graph, vigil, wait_for
+from harness import BINARIES, FRAMES, Graph, vigil, wait_for
 from schemas import SCHEMAS, problems
+
+
+@contextlib.contextmanager
+def followed(*words):
+    """What a command prints that goes on until it is ended."""
+    with subprocess.Popen([BINARIES / "vigil", *words], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield process.stdout
+        finally:
+            process.terminate()
 
 
 class Documents(unittest.TestCase):
@@ -56,6 +68,9 @@ class OfGraphs(Documents):
             self.assertLessEqual({"alarm", "diagnosis", "weighed", "reason", "fault"}, kinds)
             self.document("faults", "--graph", graph.name)
             self.document("status", "--graph", graph.name)
+            self.printed("status", "top", "--once", "--graph", graph.name)
+            with followed("faults", "--follow", "--json", "--graph", graph.name) as faults:
+                self.check("faults", json.loads(faults.readline()))
             self.document("list")
             self.check("run", graph.stop())
 

@@ -42,9 +42,9 @@ pub struct LauncherArgs {
     /// core takes long to wake; an awake one costs power.
     #[arg(long)]
     pub keep_awake: bool,
-    /// Write the times of every cycle to `DIR/SERVICE.stamps`. A record is four little-endian
+    /// Write the times of every cycle to `FOLDER/SERVICE.stamps`. A record is four little-endian
     /// 64-bit numbers, ns of CLOCK_MONOTONIC: due, input published, awake, output published.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "FOLDER")]
     pub stamps: Option<PathBuf>,
     /// Cycles whose times are kept; the oldest are dropped.
     #[arg(long, value_name = "N", default_value_t = 100_000, requires = "stamps")]

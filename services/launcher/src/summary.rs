@@ -286,7 +286,7 @@ impl fmt::Display for Summary {
         self.unseen(f)?;
         writeln!(f, "  timeline:")?;
         for event in told(&self.events) {
-            writeln!(f, "  {event}")?;
+            writeln!(f, "  {}", event.line())?;
         }
         if let Some(gave_up) = &self.gave_up {
             writeln!(f, "  given up: {gave_up}")?;

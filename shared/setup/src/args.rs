@@ -21,7 +21,7 @@ pub struct GraphArgs {
         long,
         env = "VIGIL_CONFIG",
         default_value = "config/rover.toml",
-        value_name = "F"
+        value_name = "FILE"
     )]
     pub config: PathBuf,
     /// Rate of the schedule, Hz; replaces `graph.rate_hz`.
@@ -47,14 +47,14 @@ pub struct GraphArgs {
     #[arg(long, value_name = "ADDRESS")]
     pub socket: Option<String>,
     /// Play these recorded frames (CSV or CSV.gz) instead of the simulator.
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "FILE")]
     pub replay: Option<PathBuf>,
     /// Runs to play: `all`, `heldout` (those that the model was not learned from), or ids
     /// separated by commas.
     #[arg(long, value_name = "LIST", requires = "replay")]
     pub runs: Option<String>,
     /// Speed of the playback relative to the recording.
-    #[arg(long, value_name = "X", requires = "replay")]
+    #[arg(long, value_name = "FACTOR", requires = "replay")]
     pub speed: Option<f64>,
 }
 
@@ -66,13 +66,13 @@ pub struct ServiceArgs {
     pub graph: GraphArgs,
     /// Document of a launcher that has read the configuration and all models: read in place of the
     /// graph file, options applied.
-    #[arg(long, value_name = "F", hide = true)]
+    #[arg(long, value_name = "FILE", hide = true)]
     pub setup: Option<PathBuf>,
     /// Where to leave the run report.
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
     /// Where to leave the stamps of the last cycles; see `--stamped-cycles`.
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "FILE")]
     pub stamps: Option<PathBuf>,
     /// Cycles whose stamps are kept.
     #[arg(long, value_name = "N", default_value_t = 100_000, requires = "stamps")]

@@ -221,7 +221,8 @@ fn tree(file: &TextFile) -> Result<FaultTree, SetupError> {
         let position = |name: &String| {
             let found = given.iter().position(|other| other.name == *name);
             found.ok_or_else(|| {
-                let message = format!("there is no node '{name}'");
+                let known: Vec<&str> = given.iter().map(|node| node.name.as_str()).collect();
+                let message = format!("there is no node '{name}'; known: {}", known.join(", "));
                 problem(&format!("node.{i}.parent"), message)
             })
         };

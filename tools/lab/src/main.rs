@@ -45,3 +45,32 @@ fn main() -> ExitCode {
         Command::Schema(args) => schema::run(&args),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    /// The arguments of a command and of those below it.
+    fn arguments(command: &clap::Command) -> Vec<&clap::Arg> {
+        let below = command.get_subcommands().flat_map(arguments);
+        command.get_arguments().chain(below).collect()
+    }
+
+    #[test]
+    fn one_thing_has_one_name_in_every_command() {
+        let program = Args::command();
+        let all = arguments(&program);
+        let outputs: Vec<_> = all.iter().filter(|it| it.get_id() == "out").collect();
+        assert!(outputs.len() > 9);
+        for output in outputs {
+            assert_eq!(output.get_short(), Some('o'), "{output}");
+        }
+        let names = all.iter().filter_map(|it| it.get_value_names()).flatten();
+        let others: Vec<_> = names
+            .filter(|name| ["F", "OUT", "DIR"].contains(&name.as_str()))
+            .collect();
+        assert!(others.is_empty(), "a file is a FILE: {others:?}");
+    }
+}

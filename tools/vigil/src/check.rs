@@ -259,7 +259,16 @@ fn blackbox(setup: &Setup) -> Finding {
         settings.folder_mib,
     );
     let folders = settings.folders(&setup.path, &graph.name);
+    let is_short = settings.memory_s(graph.rate_hz) < settings.before_s;
     match folders.iter().find(|folder| can_be_written(folder)) {
+        Some(folder) if is_short => {
+            let detail = format!(
+                "{detail} in {}; blackbox.before_s asks for {} s: raise blackbox.memory_mib",
+                folder.display(),
+                settings.before_s,
+            );
+            finding("black box", Status::Warning, detail)
+        }
         Some(folder) => {
             let detail = format!("{detail} in {}", folder.display());
             finding("black box", Status::Ok, detail)

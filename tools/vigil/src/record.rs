@@ -52,7 +52,7 @@ pub struct Args {
     )]
     file: Option<PathBuf>,
     /// The same as FILE.
-    #[arg(short, long, value_name = "F")]
+    #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Time to record, s; until Ctrl-C if it is not given.
     #[arg(long, value_name = "S", visible_alias = "seconds")]

@@ -20,7 +20,7 @@ pub struct Args {
     #[arg(value_name = "COMMAND")]
     command: Option<String>,
     /// Write all of them as files to this folder.
-    #[arg(long, value_name = "FOLDER", conflicts_with = "command")]
+    #[arg(short, long, value_name = "FOLDER", conflicts_with = "command")]
     out: Option<PathBuf>,
 }
 

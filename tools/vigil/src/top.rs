@@ -17,7 +17,8 @@ mod services;
 
 use std::io::{self, IsTerminal, Write};
 
-use vigil_cycle::signal;
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{placement, signal};
 use vigil_setup::RunningArgs;
 use vigil_terminal::{CommandError, Outcome, output};
 
@@ -55,6 +56,8 @@ pub struct Args {
 /// A graph that does not run; the transport's; a terminal that cannot be drawn to.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let mut watch = Watch::join(&args.running)?;
+    let setup = watch.setup();
+    placement::keep_off(&ServiceName::ALL.map(|name| setup.service(name).core));
     signal::install();
     watch.first_look();
     if args.once {

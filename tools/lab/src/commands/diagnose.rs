@@ -18,7 +18,7 @@ pub struct Args {
     #[command(flatten)]
     filter: FilterArgs,
     /// Where to write the verdicts (CSV).
-    #[arg(long, value_name = "F")]
+    #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
 }
 

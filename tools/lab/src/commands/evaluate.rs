@@ -32,14 +32,14 @@ pub struct Args {
     #[command(flatten)]
     filter: FilterArgs,
     /// Labels of the runs (CSV).
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "FILE")]
     runs: PathBuf,
     /// Runs to score.
     #[arg(long, value_enum, default_value_t = Part::Heldout)]
     part: Part,
     /// Also write all figures as one page (HTML). It shows pose alone beside pose and encoders,
     /// whatever --sensors says. For a model without faults it shows detection only.
-    #[arg(long, value_name = "OUT")]
+    #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     /// Also compare these identification filters with `multiple-hypothesis` on the same runs, for
     /// both sets of channels. Refused for a model without faults.

@@ -23,11 +23,11 @@ pub struct Args {
     #[arg(long, value_name = "LOG", required_unless_present_any = ["look", "suggest"])]
     log: Option<PathBuf>,
     /// Folder of the log.
-    #[arg(long, value_name = "DIR", required_unless_present_any = ["look", "suggest"])]
+    #[arg(long, value_name = "FOLDER", required_unless_present_any = ["look", "suggest"])]
     from: Option<PathBuf>,
     /// Where to write the frames (CSV; compressed if the name ends in .gz); with --suggest, the
-    /// descriptions: F-log.toml and F-robot.toml.
-    #[arg(long, value_name = "F", required_unless_present = "look")]
+    /// descriptions: FILE-log.toml and FILE-robot.toml.
+    #[arg(short, long, value_name = "FILE", required_unless_present = "look")]
     out: Option<PathBuf>,
     /// Say what there is in a log: its topics or files, with rates, columns and ranges.
     #[arg(long, value_name = "LOG", conflicts_with_all = ["log", "from", "out", "suggest"])]

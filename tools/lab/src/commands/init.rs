@@ -32,7 +32,7 @@ pub struct Args {
     #[arg(long, value_name = "LOG", required_unless_present = "robot")]
     from: Option<PathBuf>,
     /// Description of the robot, to be copied.
-    #[arg(long, value_name = "F", conflicts_with = "from")]
+    #[arg(long, value_name = "FILE", conflicts_with = "from")]
     robot: Option<PathBuf>,
     /// Print one JSON document.
     #[arg(long)]

@@ -34,15 +34,15 @@ const TEST_FRACTION_MAX: f64 = 0.9;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Recorded frames (CSV, plain or gzip).
-    #[arg(long, value_name = "F", required_unless_present = "show")]
+    #[arg(long, value_name = "FILE", required_unless_present = "show")]
     frames: Option<PathBuf>,
     /// Labels of the runs (CSV). Without them every run counts as healthy. A model of channels
     /// learns from them how the faults show that the description declares.
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "FILE")]
     runs: Option<PathBuf>,
     /// Frames of healthy runs (CSV) from which a model with faults also learns yaw rate and motor
     /// currents. Default: the healthy runs of --frames, if they hold these channels.
-    #[arg(long, value_name = "F", requires = "runs")]
+    #[arg(long, value_name = "FILE", requires = "runs")]
     more: Option<PathBuf>,
     /// Runs to learn from: ids separated by commas. Only a model of channels.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
@@ -51,7 +51,7 @@ pub struct Args {
     #[arg(long, value_name = "S")]
     until: Option<f64>,
     /// Where to write the model (TOML).
-    #[arg(long, value_name = "MODEL", required_unless_present = "show")]
+    #[arg(short, long, value_name = "FILE", required_unless_present = "show")]
     out: Option<PathBuf>,
     /// Print the model that --model names, and learn nothing.
     #[arg(long, requires = "model", conflicts_with_all = ["frames", "runs", "out"])]
@@ -61,7 +61,7 @@ pub struct Args {
     model: Option<PathBuf>,
     /// Fraction of the runs of every mode and kind to hold out, 0 to 0.9; of a model of channels,
     /// of all runs or, with labels, of their groups.
-    #[arg(long, value_name = "X", default_value_t = 0.333, value_parser = test_fraction)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.333, value_parser = test_fraction)]
     test_fraction: f64,
     /// Seed of the split.
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed())]

@@ -60,7 +60,7 @@ pub const SENSOR_SETS: [&str; 3] = ["pose", "pose+encoders", "all"];
 #[derive(Debug, clap::Args)]
 pub struct RobotArgs {
     /// Description of the robot (TOML).
-    #[arg(long, value_name = "F", default_value = "config/robots/rover.toml")]
+    #[arg(long, value_name = "FILE", default_value = "config/robots/rover.toml")]
     robot: PathBuf,
 }
 
@@ -78,7 +78,7 @@ pub struct FilterArgs {
     #[arg(long, value_name = "MODEL")]
     pub model: PathBuf,
     /// Recorded frames (CSV, plain or gzip), any number of runs.
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "FILE")]
     pub frames: PathBuf,
     /// Channels that the filters may use. `pose` is pose and command; `pose+encoders` adds wheel
     /// rates and steering angles; `all` is every channel of the frames that the model knows.
@@ -111,11 +111,11 @@ pub struct FilterArgs {
     #[command(flatten)]
     robot: RobotArgs,
     /// Fault tree (TOML); that of a model of channels follows from the description.
-    #[arg(long, value_name = "F", default_value = "config/trees/rover.toml")]
+    #[arg(long, value_name = "FILE", default_value = "config/trees/rover.toml")]
     tree: PathBuf,
     /// Decision model (`.pomdp`) that chooses the action of each row [default: config/rover.pomdp].
     /// A model without faults chooses none.
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "FILE")]
     decision: Option<PathBuf>,
 }
 

@@ -28,7 +28,7 @@ pub struct Args {
     #[command(flatten)]
     frames: FramesArgs,
     /// Where to write the page (HTML).
-    #[arg(short, long, value_name = "OUT")]
+    #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
 }
 

@@ -18,7 +18,7 @@ pub struct Args {
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Where to write it; standard output if not given.
-    #[arg(long, short, value_name = "F")]
+    #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print one JSON document about what was written; needs --out.
     #[arg(long, requires = "out")]

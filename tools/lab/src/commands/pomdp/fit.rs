@@ -24,13 +24,13 @@ pub struct Args {
     /// or config/rover.recovery.toml.
     parameters: PathBuf,
     /// Missions with states (JSON lines, see `vigil pomdp simulate`).
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "FILE")]
     missions: PathBuf,
     /// Visits that a number in the file counts as, from 0.
     #[arg(long, value_name = "K", default_value_t = 10.0, value_parser = weight)]
     prior_strength: f64,
     /// Where to write the fitted parameters (TOML, without comments).
-    #[arg(long, value_name = "F")]
+    #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print one JSON document.
     #[arg(long)]

@@ -16,7 +16,7 @@ pub struct Args {
     /// Parameters, such as config/corridor.recovery.toml or config/rover.recovery.toml.
     parameters: PathBuf,
     /// Where to write the model; standard output if it is not given.
-    #[arg(long)]
+    #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 

@@ -34,7 +34,7 @@ pub struct Args {
     #[arg(long)]
     missions: PathBuf,
     /// Where to write the learned model.
-    #[arg(long)]
+    #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
     /// Weight of the model made by hand: the number of visits that each of its rows counts as.
     /// 0 learns from the missions alone.

@@ -30,7 +30,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
     /// Where to write the missions (JSON lines).
-    #[arg(long, value_name = "F")]
+    #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
     /// Print one JSON document.
     #[arg(long)]

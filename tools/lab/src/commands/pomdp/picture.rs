@@ -45,7 +45,7 @@ pub struct Args {
     #[arg(long, default_value_t = 0.25)]
     tolerance: f64,
     /// Where to write the drawing (SVG or, for a graph, DOT).
-    #[arg(long)]
+    #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
 }
 

@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long)]
     states: bool,
     /// Where to write the missions.
-    #[arg(long)]
+    #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
     /// Policy file for `point-based`, as `vigil pomdp solve FILE --out POLICY` writes it; plans
     /// that `despot` may end with.

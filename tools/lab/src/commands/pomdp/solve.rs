@@ -65,7 +65,7 @@ pub struct Args {
     memory: f64,
     /// Where to write the policy. The name decides the format: `.policy` is APPL's, `.alpha` is
     /// pomdp-solve's, any other is Vigil's own, which `supervisor.policy_file` takes.
-    #[arg(long, value_name = "POLICY")]
+    #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Vectors of the policy that is written, at most: those that lose least, as a live decision
     /// takes as long as it has vectors. What they lose is sampled, and said.
