@@ -65,9 +65,13 @@ pub(crate) struct AlarmFusion {
     run_id: u64,
     t_ns: u64,
     p_nominal: f64,
-    /// The identifier knows of an alarm, and has no result yet.
+    /// The identifier knows of an alarm.
     is_identifying: bool,
+    /// It has no result about it yet.
     is_catching_up: bool,
+    /// The identifier's epoch, and that of the one that was heard before the wait.
+    epoch: u64,
+    heard_epoch: u64,
     faults: u32,
     /// Detections since the last diagnosis.
     unanswered: u32,
@@ -91,6 +95,8 @@ impl AlarmFusion {
             p_nominal: 1.0,
             is_identifying: false,
             is_catching_up: false,
+            epoch: 0,
+            heard_epoch: 0,
             faults: 0,
             unanswered: 0,
             unheard: 0,
@@ -99,9 +105,14 @@ impl AlarmFusion {
         }
     }
 
-    /// Takes an entry, and returns what of it concerns the belief. A detection that only predicts
+    /// Takes an entry, and returns what of it concerns the belief. A diagnosis that is not sound is
+    /// none. A detection that only predicts
     /// says whether the detector is blind, and nothing else.
-    pub(crate) fn take<'a>(&mut self, entry: Entry<Inputs<'a>>) -> Entry<Inputs<'a>> {
+    pub(crate) fn take<'a>(
+        &mut self,
+        entry: Entry<Inputs<'a>>,
+        is_sound: impl Fn(&FaultBelief) -> bool,
+    ) -> Entry<Inputs<'a>> {
         let Entry::Frame(inputs) = entry else {
             if matches!(entry, Entry::Reset) {
                 self.alarm.reset();
@@ -116,11 +127,12 @@ impl AlarmFusion {
         let predicts = |d: &DetectionBelief| d.cause.kind() == Some(CauseKind::Missed);
         self.blind = inputs.detection.map_or(self.blind, |d| d.blind);
         let detection = inputs.detection.filter(|d| !predicts(d));
-        if let Some(diagnosis) = inputs.diagnosis {
+        let sound = inputs.diagnosis.filter(|it| is_sound(it));
+        if let Some(diagnosis) = sound {
             self.take_diagnosis(diagnosis);
         }
         if let Some(detection) = detection {
-            let is_unanswered = u32::from(inputs.diagnosis.is_none());
+            let is_unanswered = u32::from(sound.is_none());
             self.unanswered = self.unanswered.saturating_add(is_unanswered);
             self.fuse(detection);
         }
@@ -135,6 +147,7 @@ impl AlarmFusion {
 
     fn take_diagnosis(&mut self, diagnosis: &FaultBelief) {
         self.unanswered = 0;
+        self.epoch = diagnosis.header.epoch;
         let p = diagnosis.p[0];
         self.p_nominal = if p.is_finite() { p } else { 0.0 };
         self.is_identifying = diagnosis.identifying != 0;
@@ -185,20 +198,22 @@ impl AlarmFusion {
         }
     }
 
-    /// One that was heard again has not seen all yet: the wait goes on. One that lives beside a
-    /// robot at rest cannot see anything.
+    /// Another one that is heard in its place has not seen all yet: the wait goes on.
     fn wait(&mut self, is_heard: bool, passed_s: f64) {
         self.unheard = match is_heard {
             true => 0,
             false => self.unheard.saturating_add(1),
         };
-        let goes_on = self.waited_s > 0.0 && self.waited_s < RETURN_S;
-        let is_at_rest = self.readiness == Readiness::NotExcited as u32;
+        let is_another = self.epoch != self.heard_epoch;
+        let waits = self.waited_s > 0.0 && self.waited_s < RETURN_S;
+        let goes_on = self.detected.stands() && waits && (is_another || !is_heard);
         self.waited_s = match goes_on || self.unheard >= LOST_AFTER {
-            true if is_at_rest && self.unanswered == 0 => self.waited_s,
             true => self.waited_s + passed_s,
             false => 0.0,
         };
+        if is_heard && self.waited_s == 0.0 {
+            self.heard_epoch = self.epoch;
+        }
     }
 
     const fn is_heard(&self) -> bool {

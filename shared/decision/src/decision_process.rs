@@ -41,6 +41,9 @@ pub(crate) trait DecisionRule: Checkpoint {
     /// Goes on in the run of an earlier supervisor, which told of what was `believed`.
     fn restore(&mut self, left: &Carryover, believed: Option<&FaultBelief>);
 
+    /// True of a diagnosis that can be used.
+    fn is_sound(&self, diagnosis: &FaultBelief) -> bool;
+
     /// The run that is decided about, and the hash of the model.
     fn origin(&self) -> (u64, u64);
 

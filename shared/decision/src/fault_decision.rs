@@ -230,8 +230,7 @@ fn log_score(predicted: &[f64], belief: &[f64]) -> f64 {
 
 impl DecisionRule for FaultDecision {
     fn take(&mut self, inputs: Inputs<'_>, situation: Situation) {
-        let is_sound = |d: &FaultBelief| state_belief::is_sound(d, &self.states, self.tree_hash);
-        let diagnosis = inputs.diagnosis.filter(|diagnosis| is_sound(diagnosis));
+        let diagnosis = inputs.diagnosis.filter(|it| self.is_sound(it));
         let detection = inputs.detection.filter(|d| d.p_fault.is_finite());
         if diagnosis.is_some() != inputs.diagnosis.is_some() {
             self.process.refuse();
@@ -246,7 +245,7 @@ impl DecisionRule for FaultDecision {
         }
         let is_lost = diagnosis.is_none() && self.process.losses.identifier_is_lost();
         self.latch
-            .keep_open(!situation.may_latch || is_lost && situation.is_heard);
+            .keep_open(!situation.may_latch || is_lost && situation.is_heard && situation.alarm);
         let is_late = !situation.is_heard && !situation.is_lost;
         match (diagnosis, detection) {
             // What was believed stands until it has a result.
@@ -316,6 +315,10 @@ impl DecisionRule for FaultDecision {
             self.settling = Settling::new(&process.scratch);
             self.wheels.take(believed);
         }
+    }
+
+    fn is_sound(&self, diagnosis: &FaultBelief) -> bool {
+        state_belief::is_sound(diagnosis, &self.states, self.tree_hash)
     }
 
     fn origin(&self) -> (u64, u64) {

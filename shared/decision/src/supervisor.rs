@@ -76,7 +76,8 @@ impl Supervisor {
     // Never merged into its caller, so that its instructions can be counted.
     #[inline(never)]
     pub fn step(&mut self, entry: Entry<Inputs<'_>>, action: &mut Action) {
-        let entry = self.fusion.take(entry);
+        let is_sound = |it: &FaultBelief| self.rule.is_sound(it);
+        let entry = self.fusion.take(entry, is_sound);
         let situation = self.fusion.situation();
         let is_frame = matches!(entry, Entry::Frame(_));
         match entry {
@@ -150,6 +151,9 @@ mod tests {
         }
         fn reset(&mut self) {}
         fn restore(&mut self, _: &Carryover, _: Option<&FaultBelief>) {}
+        fn is_sound(&self, _: &FaultBelief) -> bool {
+            true
+        }
         fn origin(&self) -> (u64, u64) {
             (0, 0)
         }

@@ -282,9 +282,7 @@ impl DecisionRule for SymptomDecision {
         if let Some(detection) = inputs.detection {
             self.continue_in_run(detection);
         }
-        let hardware = self.hardware.as_ref();
-        let is_sound = |d: &&FaultBelief| hardware.is_none_or(|h| h.is_sound(d));
-        let diagnosis = inputs.diagnosis.filter(is_sound);
+        let diagnosis = inputs.diagnosis.filter(|it| self.is_sound(it));
         let refuses = inputs.diagnosis.is_some() && diagnosis.is_none();
         if refuses {
             self.process.refuse();
@@ -292,7 +290,7 @@ impl DecisionRule for SymptomDecision {
         }
         let is_lost = diagnosis.is_none() && self.process.losses.identifier_is_lost();
         self.latch
-            .keep_open(!situation.may_latch || is_lost && situation.is_heard);
+            .keep_open(!situation.may_latch || is_lost && situation.is_heard && situation.alarm);
         let has_result = |it: &&FaultBelief| situation.is_heard && !it.is_catching_up();
         if diagnosis.is_some() {
             self.process.losses.diagnosis_alone();
@@ -350,6 +348,11 @@ impl DecisionRule for SymptomDecision {
 
     fn restore(&mut self, left: &Carryover, _: Option<&FaultBelief>) {
         self.process.restore(left, &mut self.latch);
+    }
+
+    fn is_sound(&self, diagnosis: &FaultBelief) -> bool {
+        let hardware = self.hardware.as_ref();
+        hardware.is_none_or(|it| it.is_sound(diagnosis))
     }
 
     fn origin(&self) -> (u64, u64) {

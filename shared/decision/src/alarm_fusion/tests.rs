@@ -31,7 +31,7 @@ fn take(fusion: &mut AlarmFusion, d: Option<&DetectionBelief>, f: Option<&FaultB
         diagnosis: f,
         detection: d,
     };
-    fusion.take(Entry::Frame(inputs));
+    fusion.take(Entry::Frame(inputs), |_| true);
 }
 
 #[test]
@@ -165,14 +165,30 @@ fn an_identifier_that_is_lost_is_waited_for_before_help_is_called() {
     };
     assert_eq!(next(Some(&begun)), (true, false));
     assert_eq!(next(Some(&heard)), (true, true));
-    // Five seconds from the loss on, heard or not.
+    // The same one is waited for no longer than until it is heard again.
+    assert_eq!([(); 9].map(|()| next(None)).last(), Some(&(false, false)));
+    assert_eq!(next(Some(&heard)), (true, true));
+    // Another one for five seconds from the loss on, heard or not.
+    let mut another = diagnosis(0.0);
+    another.header.epoch = 8;
     for k in 0..498 {
         let is_lost = !(5..=400).contains(&k);
-        let said = next((!is_lost).then_some(&heard));
+        let said = next((!is_lost).then_some(&another));
         assert!(!said.1 || k < 4, "{k}: {said:?}");
     }
     assert_eq!([(); 20].map(|()| next(None)).last(), Some(&(false, true)));
-    assert_eq!(next(Some(&heard)), (true, true));
+    assert_eq!(next(Some(&another)), (true, true));
+    // What is not sound is no answer.
+    let mut fusion = AlarmFusion::new(0.5);
+    for k in 1..20 {
+        let detection = detection(10 * k, 1);
+        let inputs = Inputs {
+            diagnosis: Some(&heard),
+            detection: Some(&detection),
+        };
+        fusion.take(Entry::Frame(inputs), |_| false);
+        assert!(!fusion.situation().is_heard);
+    }
 }
 
 #[test]
@@ -226,9 +242,9 @@ fn faults_are_those_of_a_reported_set_while_the_identifier_sees() {
 fn a_reset_or_a_new_run_ends_the_alarm() {
     let mut fusion = AlarmFusion::new(0.5);
     take(&mut fusion, Some(&detection(10, 1)), Some(&diagnosis(0.0)));
-    fusion.take(Entry::Missed(9));
+    fusion.take(Entry::Missed(9), |_| true);
     assert!(fusion.situation().alarm);
-    fusion.take(Entry::Reset);
+    fusion.take(Entry::Reset, |_| true);
     assert!(!fusion.situation().alarm);
     assert_eq!(
         (fusion.p_nominal, fusion.readiness),
@@ -272,7 +288,7 @@ fn a_prediction_says_whether_the_detector_is_blind_and_nothing_else() {
         detection: Some(&predicted),
     };
     assert!(matches!(
-        fusion.take(Entry::Frame(inputs)),
+        fusion.take(Entry::Frame(inputs), |_| true),
         Entry::Missed(0)
     ));
     let situation = fusion.situation();

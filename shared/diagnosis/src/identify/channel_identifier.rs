@@ -164,10 +164,8 @@ impl ChannelIdentifier {
                 }
                 let t_ns = input.frame.header.t_capture_ns;
                 let dt_s = t_ns.saturating_sub(self.t_ns) as f64 * 1e-9;
-                if self.t_ns != 0 {
-                    let watched_s = dt_s.min(STEP_MAX_S);
-                    self.sight
-                        .pass(watched_s, if self.moves { watched_s } else { 0.0 });
+                if self.t_ns != 0 && self.moves {
+                    self.sight.pass(dt_s.min(STEP_MAX_S));
                 }
                 if let Some((detection, _)) = input.detection {
                     self.take(detection, dt_s);
@@ -195,7 +193,9 @@ impl ChannelIdentifier {
         // An alarm of this run stands on.
         self.alarm.begin_run(self.run_id);
         self.sight = OnsetSight::default();
-        self.sight.take(self.alarm.stands());
+        if self.alarm.stands() {
+            self.sight.take(true);
+        }
         self.has_judged = false;
     }
 

@@ -30,7 +30,10 @@ impl Detection {
             alarm: self.alarm,
             ..Self::default()
         };
-        self.sight.take(self.alarm.stands());
+        // What stands on was there before.
+        if self.alarm.stands() {
+            self.sight.take(true);
+        }
     }
 
     /// Takes the next belief, unless an alarm is held against it. Scales and rates beyond what a
@@ -64,9 +67,9 @@ impl Detection {
         };
     }
 
-    /// So much time was observed, with so much motion in it.
-    pub fn pass(&mut self, watched_s: f64, moved_s: f64) {
-        self.sight.pass(watched_s, moved_s);
+    /// So much motion was observed.
+    pub fn pass(&mut self, moved_s: f64) {
+        self.sight.pass(moved_s);
     }
 
     /// True if what was found is to be told, in which faults with a name have `p_named`. Who has
@@ -151,7 +154,7 @@ mod tests {
         };
         for (moved_s, may) in [(0.0, false), (2.5, false), (0.5, true)] {
             found.take(&belief, &map);
-            found.pass(moved_s, moved_s);
+            found.pass(moved_s);
             assert_eq!(found.may_tell(0.5), may);
             assert!(found.may_tell(0.51), "a fault is told at once");
         }

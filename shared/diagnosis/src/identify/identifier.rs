@@ -250,7 +250,7 @@ impl Identifier {
             self.keep(input);
             let observation = self.observer.observation();
             self.moved_s += observation.moved_s();
-            self.detection.pass(observation.dt_s, observation.moved_s());
+            self.detection.pass(observation.moved_s());
         }
         if self.in_trouble {
             self.phase = Phase::Watching;

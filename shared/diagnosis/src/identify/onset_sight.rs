@@ -2,36 +2,28 @@
 
 use vigil_checkpoint::CheckpointValue;
 
-/// Who has watched for less than this before an alarm has begun beside it, s. Chosen: no detector
-/// that began at the same time has armed by then.
-const EARLIEST_ALARM_S: f64 = 1.0;
 /// Motion, s, after which an identifier that began beside an alarm knows as much as another one.
 /// Chosen: as much as it keeps by default; a robot waits for it in doubt.
 const ENOUGH_S: f64 = 3.0;
 
-/// For how long an identifier has watched the robot, and whether an alarm stood before that.
+/// How much motion an identifier has seen, and whether an alarm stood before that.
 #[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 pub struct OnsetSight {
-    watched_s: f64,
-    /// Motion in that time: a robot at rest shows nothing.
-    moved_s: f64,
-    stands: bool,
+    has_begun: bool,
     is_late: bool,
+    moved_s: f64,
 }
 
 impl OnsetSight {
-    /// So much time was watched, with so much motion in it.
-    pub fn pass(&mut self, watched_s: f64, moved_s: f64) {
-        self.watched_s += watched_s;
+    /// So much more motion was seen.
+    pub fn pass(&mut self, moved_s: f64) {
         self.moved_s += moved_s;
     }
 
     /// Takes whether an alarm stands.
-    pub fn take(&mut self, stands: bool) {
-        if stands != self.stands {
-            self.is_late = stands && self.watched_s < EARLIEST_ALARM_S;
-        }
-        self.stands = stands;
+    pub const fn take(&mut self, stands: bool) {
+        self.is_late = stands && (self.is_late || !self.has_begun);
+        self.has_begun = true;
     }
 
     /// True while an alarm stands that was there before the identifier, which has seen little
@@ -51,30 +43,24 @@ mod tests {
         let mut sight = OnsetSight::default();
         assert!(!sight.is_short());
         sight.take(true);
-        assert!(sight.is_short());
-        sight.pass(9.0, 2.5);
+        sight.pass(2.5);
         sight.take(true);
         assert!(sight.is_short());
-        sight.pass(0.5, 0.5);
+        sight.pass(0.5);
         assert!(!sight.is_short());
-        sight.take(false);
-        sight.take(true);
-        assert!(!sight.is_short(), "it has seen the second one begin");
     }
 
     #[test]
-    fn who_has_watched_a_second_before_the_alarm_is_not() {
+    fn who_has_seen_the_alarm_rise_or_fall_is_not() {
         let mut sight = OnsetSight::default();
-        sight.pass(0.5, 0.0);
         sight.take(false);
-        sight.pass(0.5, 0.0);
         sight.take(true);
         assert!(!sight.is_short());
         sight = OnsetSight::default();
-        sight.pass(0.9, 0.9);
         sight.take(true);
-        assert!(sight.is_short());
         sight.take(false);
-        assert!(!sight.is_short(), "it has fallen");
+        assert!(!sight.is_short());
+        sight.take(true);
+        assert!(!sight.is_short());
     }
 }
