@@ -47,6 +47,8 @@ pub(crate) struct Situation {
     pub is_heard: bool,
     /// It is not, and has not been for some cycles: what is late now and then is not lost.
     pub is_lost: bool,
+    /// Another one is waited for: before its first result what was believed stands.
+    pub waits: bool,
     /// It has been heard for a while, or was not for so long that it is not waited for: help may be
     /// called.
     pub may_latch: bool,
@@ -67,8 +69,6 @@ pub(crate) struct AlarmFusion {
     p_nominal: f64,
     /// The identifier knows of an alarm.
     is_identifying: bool,
-    /// It has no result about it yet.
-    is_catching_up: bool,
     /// The identifier's epoch, and that of the one that was heard before the wait.
     epoch: u64,
     heard_epoch: u64,
@@ -94,7 +94,6 @@ impl AlarmFusion {
             t_ns: 0,
             p_nominal: 1.0,
             is_identifying: false,
-            is_catching_up: false,
             epoch: 0,
             heard_epoch: 0,
             faults: 0,
@@ -119,8 +118,7 @@ impl AlarmFusion {
                 self.detected = DetectorAlarm::default();
                 self.readiness = Readiness::Arming as u32;
                 (self.p_nominal, self.faults, self.unanswered) = (1.0, 0, 0);
-                (self.is_identifying, self.is_catching_up) = (false, false);
-                (self.unheard, self.waited_s) = (0, 0.0);
+                (self.is_identifying, self.unheard, self.waited_s) = (false, 0, 0.0);
             }
             return entry;
         };
@@ -151,7 +149,6 @@ impl AlarmFusion {
         let p = diagnosis.p[0];
         self.p_nominal = if p.is_finite() { p } else { 0.0 };
         self.is_identifying = diagnosis.identifying != 0;
-        self.is_catching_up = diagnosis.is_catching_up();
         let set = &diagnosis.sets[0];
         let is_named = diagnosis.set_count > 0 && set.p >= REPORTED;
         self.faults = match is_named && diagnosis.mode != MODE_BLIND {
@@ -190,9 +187,10 @@ impl AlarmFusion {
             p_fault: self.detected.p_fault(),
             is_heard: self.is_heard(),
             is_lost: !self.is_heard() && (self.unheard >= LOST_AFTER || self.waited_s > 0.0),
+            waits: self.waited_s > 0.0 && self.waited_s < RETURN_S,
             may_latch: match self.waited_s > 0.0 {
                 true => self.waited_s >= RETURN_S,
-                false => self.is_heard() && !self.is_catching_up,
+                false => self.is_heard(),
             },
             rests: self.rests(),
         }

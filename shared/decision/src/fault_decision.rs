@@ -249,7 +249,7 @@ impl DecisionRule for FaultDecision {
         let is_late = !situation.is_heard && !situation.is_lost;
         match (diagnosis, detection) {
             // What was believed stands until it has a result.
-            (Some(diagnosis), _) if diagnosis.is_catching_up() || is_late => {
+            (Some(diagnosis), _) if situation.waits && diagnosis.is_catching_up() || is_late => {
                 self.process.losses.diagnosis();
                 self.begin_run(diagnosis.run_id);
             }

@@ -291,7 +291,8 @@ impl DecisionRule for SymptomDecision {
         let is_lost = diagnosis.is_none() && self.process.losses.identifier_is_lost();
         self.latch
             .keep_open(!situation.may_latch || is_lost && situation.is_heard && situation.alarm);
-        let has_result = |it: &&FaultBelief| situation.is_heard && !it.is_catching_up();
+        let has_result =
+            |it: &&FaultBelief| situation.is_heard && !(situation.waits && it.is_catching_up());
         if diagnosis.is_some() {
             self.process.losses.diagnosis_alone();
         }

@@ -1,5 +1,3 @@
-use vigil_blocks::CATCHING_UP;
-
 use super::*;
 
 const MS: u64 = 1_000_000;
@@ -159,11 +157,6 @@ fn an_identifier_that_is_lost_is_waited_for_before_help_is_called() {
     // A diagnosis or two that know of nothing yet are no loss.
     let unaware = FaultBelief::default();
     assert_eq!(next(Some(&unaware)), (false, false));
-    let begun = FaultBelief {
-        identifying: CATCHING_UP,
-        ..FaultBelief::default()
-    };
-    assert_eq!(next(Some(&begun)), (true, false));
     assert_eq!(next(Some(&heard)), (true, true));
     // The same one is waited for no longer than until it is heard again.
     assert_eq!([(); 9].map(|()| next(None)).last(), Some(&(false, false)));

@@ -391,10 +391,13 @@ fn a_doubt_in_the_first_words_of_a_new_identifier_calls_nobody() {
 }
 
 #[test]
-fn before_its_first_result_about_an_alarm_an_identifier_changes_nothing() {
+fn before_its_first_result_an_identifier_that_is_waited_for_changes_nothing() {
     let mut stages = Stages::new();
     stages.named("RM_STUCK");
     stages.cycles(100);
+    stages.replaced();
+    stages.diagnosis.header.epoch = 9;
+    stages.cycles(5);
     stages.diagnosis.p.fill(0.0);
     stages.p_fault(0.1);
     stages.diagnosis.identifying = CATCHING_UP;
