@@ -59,6 +59,7 @@ impl Stages {
         self.detection.alarm = 1;
         self.detection.alarm_t_capture_ns = 7;
         self.diagnosis.identifying = 0;
+        self.diagnosis.header.epoch = 9;
     }
 
     /// A supervisor that goes on from what this one leaves.
@@ -396,7 +397,6 @@ fn before_its_first_result_an_identifier_that_is_waited_for_changes_nothing() {
     stages.named("RM_STUCK");
     stages.cycles(100);
     stages.replaced();
-    stages.diagnosis.header.epoch = 9;
     stages.cycles(5);
     stages.diagnosis.p.fill(0.0);
     stages.p_fault(0.1);
