@@ -54,6 +54,8 @@ pub(crate) struct Situation {
     pub may_latch: bool,
     /// The robot rests: nothing that it does would show a fault.
     pub rests: bool,
+    /// The diagnosis of this entry cannot be used.
+    pub is_refused: bool,
 }
 
 /// Follows detections and diagnoses.
@@ -69,6 +71,7 @@ pub(crate) struct AlarmFusion {
     p_nominal: f64,
     /// The identifier knows of an alarm.
     is_identifying: bool,
+    is_refused: bool,
     /// The identifier's epoch, and that of the one that was heard before the wait.
     epoch: u64,
     heard_epoch: u64,
@@ -94,6 +97,7 @@ impl AlarmFusion {
             t_ns: 0,
             p_nominal: 1.0,
             is_identifying: false,
+            is_refused: false,
             epoch: 0,
             heard_epoch: 0,
             faults: 0,
@@ -126,6 +130,7 @@ impl AlarmFusion {
         self.blind = inputs.detection.map_or(self.blind, |d| d.blind);
         let detection = inputs.detection.filter(|d| !predicts(d));
         let sound = inputs.diagnosis.filter(|it| is_sound(it));
+        self.is_refused = inputs.diagnosis.is_some() && sound.is_none();
         if let Some(diagnosis) = sound {
             self.take_diagnosis(diagnosis);
         }
@@ -193,6 +198,7 @@ impl AlarmFusion {
                 false => self.is_heard(),
             },
             rests: self.rests(),
+            is_refused: self.is_refused,
         }
     }
 

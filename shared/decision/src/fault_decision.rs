@@ -230,7 +230,7 @@ fn log_score(predicted: &[f64], belief: &[f64]) -> f64 {
 
 impl DecisionRule for FaultDecision {
     fn take(&mut self, inputs: Inputs<'_>, situation: Situation) {
-        let diagnosis = inputs.diagnosis.filter(|it| self.is_sound(it));
+        let diagnosis = inputs.diagnosis.filter(|_| !situation.is_refused);
         let detection = inputs.detection.filter(|d| d.p_fault.is_finite());
         if diagnosis.is_some() != inputs.diagnosis.is_some() {
             self.process.refuse();

@@ -282,7 +282,7 @@ impl DecisionRule for SymptomDecision {
         if let Some(detection) = inputs.detection {
             self.continue_in_run(detection);
         }
-        let diagnosis = inputs.diagnosis.filter(|it| self.is_sound(it));
+        let diagnosis = inputs.diagnosis.filter(|_| !situation.is_refused);
         let refuses = inputs.diagnosis.is_some() && diagnosis.is_none();
         if refuses {
             self.process.refuse();
