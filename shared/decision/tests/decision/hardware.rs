@@ -6,7 +6,22 @@ use vigil_blocks::{
 };
 use vigil_decision::Inputs;
 
-use crate::navigation::{CYCLE_NS, JOINT, Navigation, build, joint_settings};
+use crate::navigation::{CYCLE_NS, JOINT, Navigation, joint_settings};
+
+/// The shipped model without a state of a lost robot: what is unknown is the hardware's.
+fn without_a_lost_state() -> Navigation {
+    let mut settings = joint_settings();
+    settings.lost_state = None;
+    Navigation::with(JOINT, &settings)
+}
+
+/// An alarm of which the identifier knows nothing.
+fn alarm_alone(robot: &mut Navigation) {
+    robot.detection.alarm = 1;
+    robot.detection.alarm_t_capture_ns = 7;
+    robot.detection.p_fault = 0.999;
+    robot.nothing();
+}
 
 #[test]
 fn a_stuck_wheel_is_steered_against_also_through_an_opening() {
@@ -122,10 +137,7 @@ fn what_is_unknown_is_a_place_that_is_lost_or_a_fault_that_nobody_has_modelled()
     let unknown = robot.p("UNKNOWN") + robot.p("UNKNOWN_NEW");
     assert!(unknown > robot.p("LST"), "{unknown}");
     // Without a state of a lost robot it is the hardware's.
-    let mut alone = joint_settings();
-    alone.lost_state = None;
-    let mut robot = Navigation::joint();
-    robot.supervisor = build(JOINT, &alone).unwrap();
+    let mut robot = without_a_lost_state();
     robot.rest(1.0, 0);
     robot.detection.alarm = 1;
     robot.unknown(0.999);
@@ -263,16 +275,9 @@ fn an_identifier_of_another_tree_is_refused_and_symptoms_are_heard_all_the_same(
 
 #[test]
 fn a_call_that_is_put_off_is_a_decision_of_its_own_once_it_is_made() {
-    let mut settings = joint_settings();
-    settings.lost_state = None;
-    let mut robot = Navigation::joint();
-    robot.supervisor = build(JOINT, &settings).unwrap();
+    let mut robot = without_a_lost_state();
     robot.rest(1.0, 0);
-    // Of this alarm the identifier knows nothing.
-    robot.detection.alarm = 1;
-    robot.detection.alarm_t_capture_ns = 7;
-    robot.detection.p_fault = 0.999;
-    robot.nothing();
+    alarm_alone(&mut robot);
     let mut before = (robot.kind(), robot.action.decision_seq);
     for cycle in 0..6000 {
         robot.cycle(0);
@@ -291,15 +296,9 @@ fn a_call_that_is_put_off_is_a_decision_of_its_own_once_it_is_made() {
 
 #[test]
 fn an_identifier_that_is_late_by_a_cycle_calls_nobody() {
-    let mut settings = joint_settings();
-    settings.lost_state = None;
-    let mut robot = Navigation::joint();
-    robot.supervisor = build(JOINT, &settings).unwrap();
+    let mut robot = without_a_lost_state();
     robot.rest(1.0, 0);
-    robot.detection.alarm = 1;
-    robot.detection.alarm_t_capture_ns = 7;
-    robot.detection.p_fault = 0.999;
-    robot.nothing();
+    alarm_alone(&mut robot);
     robot.cycle(0);
     robot.diagnosis.identifying = CATCHING_UP;
     robot.rest(0.1, 0);
