@@ -59,6 +59,8 @@ enum Question {
     Promise(promise::Args),
     /// Are broken sensors found, named and sized in the logs of real robots?
     RealLogs(real_logs::Args),
+    /// Is a recording of ten minutes with five faults computed again bit by bit, and how fast?
+    Replay(replay::Args),
     /// How many lines of code does each room have, and what do the services link?
     Size(size::Args),
     /// How near are the solver's bounds after a fixed time, and does every policy earn what it
@@ -66,6 +68,8 @@ enum Question {
     Solver(solver::Args),
     /// Are taped wheels of a real robot found, and told apart?
     TapedWheels,
+    /// How much of a core does `vigil top` take?
+    Top(top::Args),
     /// Writes bench/README.md anew from the results
     Page,
     #[command(flatten)]
@@ -100,9 +104,11 @@ impl Question {
             Self::Peers(args) => peers::run(args),
             Self::Promise(args) => promise::run(args),
             Self::RealLogs(args) => real_logs::run(args),
+            Self::Replay(args) => replay::run(args),
             Self::Size(args) => size::run(args),
             Self::Solver(args) => solver::run(args),
             Self::TapedWheels => taped_wheels::run(),
+            Self::Top(args) => top::run(args),
             Self::Page => write_page(),
             Self::Role(role) => role.play(),
         }

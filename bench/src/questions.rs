@@ -14,9 +14,11 @@ pub mod mutants;
 pub mod peers;
 pub mod promise;
 pub mod real_logs;
+pub mod replay;
 pub mod size;
 pub mod solver;
 pub mod taped_wheels;
+pub mod top;
 
 use std::error::Error;
 use std::fs::File;

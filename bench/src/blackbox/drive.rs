@@ -2,27 +2,22 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::fs::{self, File};
 use std::path::Path;
-use std::process::Child;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use vigil_cycle::{Clock, Monotonic, clock, signal};
+use vigil_cycle::{Clock, Monotonic, clock};
 
 use super::half::{Deadlines, Half, Span, State};
 use super::process::Process;
 use crate::chain::STAGE_NAMES;
 use crate::latency::cycles::join;
 use crate::latency::graph::{Change, GraphFile, GraphRun};
+use crate::launched::Launched;
 
 /// Time after the start, or the orderly end, of a black box that is left out.
 const SETTLE: Duration = Duration::from_secs(1);
-/// Time for the graph to come up.
-const START_LIMIT: Duration = Duration::from_secs(60);
 /// Cycles at the start that are no steady state.
 const WARM_UP: Duration = Duration::from_secs(2);
-/// Between two looks.
-const POLL: Duration = Duration::from_millis(50);
 /// Time around a half, s: to settle, to end a black box, to start another.
 const AROUND_S: f64 = 10.0;
 
@@ -44,18 +39,6 @@ pub struct Run {
     pub halves: Vec<Half>,
 }
 
-/// A launched graph; stopped when dropped.
-struct Launched(Child);
-
-impl Drop for Launched {
-    fn drop(&mut self) {
-        if matches!(self.0.try_wait(), Ok(None)) {
-            signal::terminate(self.0.id());
-            let _ = self.0.wait();
-        }
-    }
-}
-
 impl Plan {
     /// Measures; what it needs for the time lies in `folder`.
     ///
@@ -70,15 +53,10 @@ impl Plan {
         };
         let graph = GraphFile::new(change, folder)?;
         let seconds = 4.0 * self.rounds as f64 * (self.seconds + AROUND_S);
-        let [printed, errors] = ["printed.json", "errors.txt"].map(|name| folder.join(name));
-        let mut command = graph.command(seconds, folder);
-        command.stdout(File::create(&printed)?);
-        command.stderr(File::create(&errors)?);
-        let mut launched = Launched(command.spawn()?);
-        wait_until_ready(&graph, &mut launched, &errors)?;
+        let launched = Launched::start(&graph, graph.command(seconds, folder), folder)?;
+        std::thread::sleep(WARM_UP);
         let spans = self.spans(&graph)?;
-        drop(launched);
-        let ran = GraphRun::read(&fs::read(printed)?, folder)?;
+        let ran = GraphRun::read(&launched.stop()?, folder)?;
         Self::split(&graph, &ran, spans)
     }
 
@@ -164,26 +142,4 @@ impl Plan {
             false => Err("a half without a cycle".into()),
         }
     }
-}
-
-/// Waits until every stage answers, and a while longer.
-fn wait_until_ready(
-    graph: &GraphFile,
-    launched: &mut Launched,
-    errors: &Path,
-) -> Result<(), Box<dyn Error>> {
-    let (events, began) = (graph.setup().domain()?.events_file(), Instant::now());
-    let is_ready = || fs::read_to_string(&events).is_ok_and(|text| text.contains("\"ready\""));
-    while !is_ready() {
-        if let Some(status) = launched.0.try_wait()? {
-            let said = fs::read_to_string(errors).unwrap_or_default();
-            return Err(format!("the graph ended with {status}\n{said}").into());
-        }
-        if began.elapsed() > START_LIMIT {
-            return Err(format!("no graph after {START_LIMIT:?}").into());
-        }
-        std::thread::sleep(POLL);
-    }
-    std::thread::sleep(WARM_UP);
-    Ok(())
 }

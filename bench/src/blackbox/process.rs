@@ -3,18 +3,17 @@
 use std::fs::{self, Metadata};
 use std::io;
 use std::os::unix::fs::MetadataExt;
-use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use vigil_cycle::{Domain, signal};
 
+use crate::process_time::cpu_s;
+
 /// Time in which it makes its ring, or ends.
 const LIMIT: Duration = Duration::from_secs(20);
 /// Between two looks.
 const POLL: Duration = Duration::from_millis(10);
-/// Ticks of the kernel's account of computing time in a second, on every Linux.
-const TICKS_1_S: f64 = 100.0;
 
 /// The black box, or none at present.
 pub struct Process {
@@ -125,17 +124,16 @@ impl Process {
     }
 
     fn present_cpu_s(&self) -> f64 {
-        let text = self.read("stat");
-        // After the name in brackets: user time is the twelfth field, that of the system follows.
-        let fields = text.rsplit(')').next().unwrap_or_default();
-        let ticks = fields.split_ascii_whitespace().skip(11).take(2);
-        let ticks = ticks.filter_map(|field| field.parse::<f64>().ok());
-        ticks.sum::<f64>() / TICKS_1_S
+        self.child.as_ref().map_or(0.0, |child| cpu_s(child.id()))
     }
 
     /// Its resident memory, bytes.
     pub fn memory_bytes(&self) -> u64 {
-        let text = self.read("status");
+        let Some(child) = &self.child else {
+            return 0;
+        };
+        let path = format!("/proc/{}/status", child.id());
+        let text = fs::read_to_string(path).unwrap_or_default();
         let line = text.lines().find_map(|line| line.strip_prefix("VmRSS:"));
         let kib = line.and_then(|rest| rest.split_ascii_whitespace().next());
         1024 * kib.and_then(|kib| kib.parse().ok()).unwrap_or(0)
@@ -144,14 +142,6 @@ impl Process {
     /// Its ring, bytes.
     pub fn ring_bytes(&self) -> u64 {
         self.ring().map_or(0, |ring| ring.len())
-    }
-
-    fn read(&self, file: &str) -> String {
-        let Some(child) = &self.child else {
-            return String::new();
-        };
-        let path = PathBuf::from(format!("/proc/{}/{file}", child.id()));
-        fs::read_to_string(path).unwrap_or_default()
     }
 }
 

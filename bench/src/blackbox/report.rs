@@ -126,15 +126,17 @@ pub fn table(run: &Run) -> Vec<String> {
     lines
 }
 
-/// Whether a black box costs no more than it may.
+/// Whether a black box costs no more than it may, in each state.
 fn verdict(run: &Run) -> String {
-    let [p50, p99] = [0, 1].map(|percentile| run.ratio(State::On, percentile));
+    let states = [State::On, State::Stopped, State::Killed].map(|state| {
+        let [p50, p99] = [0, 1].map(|percentile| judge(run.ratio(state, percentile), RATIO_MAX));
+        let misses = judge(run.misses_more(state), MISSES_MORE_MAX);
+        format!("{}: {p50}, {p99}, {misses}", state.name())
+    });
     format!(
-        "With a black box: p50 at most {RATIO_MAX} times that without: {}; p99: {}; at most \
-         {MISSES_MORE_MAX} further own miss in 100,000: {}.",
-        judge(p50, RATIO_MAX),
-        judge(p99, RATIO_MAX),
-        judge(run.misses_more(State::On), MISSES_MORE_MAX),
+        "p50 and p99 at most {RATIO_MAX} times those without a black box, and at most \
+         {MISSES_MORE_MAX} further own miss in 100,000. {}.",
+        states.join("; ")
     )
 }
 

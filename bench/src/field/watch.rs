@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::error::Error;
 
-use vigil_blocks::{FaultSource, FaultState, Faults, Readiness, SensorFrame};
+use vigil_blocks::{FaultRecord, FaultSource, FaultState, Readiness, SensorFrame};
 use vigil_decision::{FaultLife, LifeInput};
 use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Verdict;
@@ -27,8 +27,8 @@ struct ToldFaults {
     life: FaultLife,
     /// By number, how often each of the robot became active.
     activations: BTreeMap<u64, u32>,
-    /// Faults that were told of, of whatever.
-    told: BTreeSet<u64>,
+    /// The robot's that were pending at some time, by number.
+    pending: BTreeSet<u64>,
     /// When the alarm stood last, s.
     alarm_t_s: f64,
     /// Faults that became active without it.
@@ -50,8 +50,13 @@ impl ToldFaults {
         if stages.action().alarm != 0 {
             self.alarm_t_s = t_s;
         }
+        let is_pending = |record: &&FaultRecord| {
+            let is_of_robot = record.source == FaultSource::Robot as u32;
+            is_of_robot && record.state() == Some(FaultState::Pending)
+        };
+        let pending = self.life.records().filter(is_pending);
+        self.pending.extend(pending.map(|record| record.number));
         while let Some(record) = self.life.take_change() {
-            self.told.insert(record.number);
             // That frames are missing is for other figures.
             if record.source == FaultSource::Robot as u32 {
                 self.activations.insert(record.number, record.count);
@@ -62,11 +67,10 @@ impl ToldFaults {
         }
     }
 
-    /// Faults that were gone before they were told of.
+    /// Faults of the robot that were gone before they were told of.
     fn pending_alone(&self) -> usize {
-        let mut block = Box::<Faults>::default();
-        self.life.write(&mut block, 0);
-        (block.fault_count as usize).saturating_sub(self.told.len())
+        let is_told = |number: &&u64| self.activations.contains_key(*number);
+        self.pending.len() - self.pending.iter().filter(is_told).count()
     }
 }
 
@@ -89,7 +93,7 @@ impl<'a> Watch<'a> {
             told: ToldFaults {
                 life: vigil_supervisor::fault_life(setup)?,
                 activations: BTreeMap::new(),
-                told: BTreeSet::new(),
+                pending: BTreeSet::new(),
                 alarm_t_s: f64::NEG_INFINITY,
                 without_alarm: 0,
             },

@@ -29,7 +29,7 @@ use crate::say::say;
 ///
 /// The launcher starts it; it ends when it is asked to, or with the last service.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(version)]
 struct Args {
     #[command(flatten)]
     running: RunningArgs,

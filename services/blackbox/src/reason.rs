@@ -10,14 +10,14 @@ use crate::feeds::News;
 /// Why a recording is written, in the order of what names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Reason {
-    /// Somebody asked for it.
-    Request,
     /// A service has ended, was replaced, or no longer reports.
     Crash,
     /// An alarm rose, or a fault became active.
     Alarm,
     /// The robot was told to stop, or stopped itself.
     SafeStop,
+    /// Somebody asked for it.
+    Request,
     /// A service missed cycles.
     Miss,
     /// Somebody records into a file of his own.

@@ -13,7 +13,7 @@ use vigil_setup::ServiceArgs;
 
 /// Detects any deviation from nominal behaviour.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(version)]
 struct Args {
     #[command(flatten)]
     service: ServiceArgs,

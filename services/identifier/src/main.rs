@@ -13,7 +13,7 @@ use vigil_setup::ServiceArgs;
 
 /// Identifies the fault.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(version)]
 struct Args {
     #[command(flatten)]
     service: ServiceArgs,

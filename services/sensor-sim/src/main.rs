@@ -19,7 +19,7 @@ use vigil_setup::{ServiceArgs, Setup};
 
 /// The simulated rover, playback of recorded frames, and frames that arrive at a socket.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(version)]
 struct Args {
     #[command(flatten)]
     service: ServiceArgs,

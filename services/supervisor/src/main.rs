@@ -13,7 +13,7 @@ use vigil_supervisor::{SupervisorStage, steps, validity_ns};
 
 /// Decides what to do about a fault.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(version)]
 struct Args {
     #[command(flatten)]
     service: ServiceArgs,

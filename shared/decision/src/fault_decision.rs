@@ -118,7 +118,7 @@ impl FaultDecision {
         let before = process.tracker.belief();
         let weights = &mut process.scratch;
         let mut settling = self.settling;
-        if situation.is_heard {
+        if situation.hearing.is_heard() {
             let answerable = self.wheels.answerable();
             let alarm = situation.alarm;
             write_weights(diagnosis, &self.states, answerable, alarm, weights);
@@ -131,7 +131,7 @@ impl FaultDecision {
         }
         // Of a robot that rests no evidence comes, and none ends; that of an identifier which is
         // not heard yet is still to come.
-        if timed && !situation.rests && situation.is_heard {
+        if timed && !situation.rests && situation.hearing.is_heard() {
             settling.pass(&self.states, before);
         }
         settling.take(&self.states, weights);
@@ -139,7 +139,7 @@ impl FaultDecision {
         let is_due = timed
             || process.control_mode != ControlMode::Policy
             || distance(before, weights) > MOVED
-            || situation.is_heard && self.wheels.have_moved(diagnosis);
+            || situation.hearing.is_heard() && self.wheels.have_moved(diagnosis);
         if !is_due {
             return;
         }
@@ -147,7 +147,7 @@ impl FaultDecision {
         process.control_mode = ControlMode::Policy;
         process.tracker.anchor(&process.scratch);
         self.settling = settling;
-        if situation.is_heard {
+        if situation.hearing.is_heard() {
             self.wheels.take(diagnosis);
         }
         self.decide(t_capture_ns);
@@ -244,16 +244,17 @@ impl DecisionRule for FaultDecision {
             self.process.losses.detection();
         }
         let is_lost = diagnosis.is_none() && self.process.losses.identifier_is_lost();
-        self.latch
-            .keep_open(!situation.may_latch || is_lost && situation.is_heard && situation.alarm);
-        let is_late = !situation.is_heard && !situation.is_lost;
+        self.latch.keep_open(situation.forbids_latching(is_lost));
+        let hearing = situation.hearing;
         match (diagnosis, detection) {
             // What was believed stands until it has a result.
-            (Some(diagnosis), _) if situation.waits && diagnosis.is_catching_up() || is_late => {
+            (Some(diagnosis), _)
+                if hearing.is_late() || hearing.waits() && diagnosis.is_catching_up() =>
+            {
                 self.process.losses.diagnosis();
                 self.begin_run(diagnosis.run_id);
             }
-            (Some(diagnosis), _) if situation.is_heard || !situation.may_latch => {
+            (Some(diagnosis), _) if hearing.is_heard() || !hearing.may_latch() => {
                 self.process.losses.diagnosis();
                 self.take_diagnosis(diagnosis, situation);
             }

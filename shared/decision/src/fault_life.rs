@@ -212,6 +212,11 @@ impl FaultLife {
         Some(&changed.record)
     }
 
+    /// The faults that are kept; a free place has number 0.
+    pub fn records(&self) -> impl Iterator<Item = &FaultRecord> {
+        self.tracked.iter().map(|tracked| &tracked.record)
+    }
+
     /// Another after each change.
     #[must_use]
     pub const fn revision(&self) -> u64 {
@@ -225,8 +230,8 @@ impl FaultLife {
         block.fault_count = self.fault_count;
         block.dropped_count = self.dropped_count;
         block.overall = self.overall as u32;
-        for (record, tracked) in block.records.iter_mut().zip(&self.tracked) {
-            *record = tracked.record;
+        for (written, record) in block.records.iter_mut().zip(self.records()) {
+            *written = *record;
         }
     }
 

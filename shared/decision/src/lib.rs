@@ -9,6 +9,7 @@ mod error;
 mod fault_decision;
 mod fault_life;
 mod hardware_belief;
+mod hearing;
 mod inputs;
 mod joint_states;
 mod kept;

@@ -123,7 +123,7 @@ impl Supervisor {
     /// False while the identifier knows nothing yet of an alarm that stands.
     #[must_use]
     pub fn hears_identifier(&self) -> bool {
-        self.fusion.situation().is_heard
+        self.fusion.situation().hearing.is_heard()
     }
 
     /// The action that stands whatever is believed: a call for help, or the end of the task. It

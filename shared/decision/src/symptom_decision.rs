@@ -107,7 +107,7 @@ impl SymptomDecision {
             self.process.control_mode = ControlMode::Fallback;
             self.take_alarm(detection, situation);
         }
-        if self.process.is_deferred && situation.may_latch {
+        if self.process.is_deferred && situation.hearing.may_latch() {
             let before = self.process.choice.action;
             self.choose();
             if self.process.choice.action != before {
@@ -289,10 +289,10 @@ impl DecisionRule for SymptomDecision {
             self.miss(1);
         }
         let is_lost = diagnosis.is_none() && self.process.losses.identifier_is_lost();
-        self.latch
-            .keep_open(!situation.may_latch || is_lost && situation.is_heard && situation.alarm);
+        self.latch.keep_open(situation.forbids_latching(is_lost));
+        let hearing = situation.hearing;
         let has_result =
-            |it: &&FaultBelief| situation.is_heard && !(situation.waits && it.is_catching_up());
+            |it: &&FaultBelief| hearing.is_heard() && !(hearing.waits() && it.is_catching_up());
         if diagnosis.is_some() {
             self.process.losses.diagnosis_alone();
         }
@@ -303,7 +303,7 @@ impl DecisionRule for SymptomDecision {
         match inputs.detection {
             Some(detection) => {
                 self.process.losses.detection();
-                let is_lost = self.process.losses.identifier_is_lost() || situation.is_lost;
+                let is_lost = self.process.losses.identifier_is_lost() || hearing.is_lost();
                 let knows = told.is_some() || is_lost || !situation.alarm;
                 if knows || self.process.control_mode != ControlMode::Safe {
                     self.take_detection(detection, is_lost, situation);

@@ -5,8 +5,7 @@ use vigil_checkpoint::CheckpointValue;
 
 use crate::alarm::Lull;
 
-/// Motion between two beliefs counts for at most this long, s. Chosen: ten observations of 50 ms;
-/// what is further apart does not show what was between.
+/// Motion between two beliefs counts for at most this long, s. Chosen: ten observations of 50 ms.
 const STEP_MAX_S: f64 = 0.5;
 
 /// What the detector says of a fault. One that has just begun, or whose frames come from another
@@ -19,8 +18,9 @@ pub struct DetectorAlarm {
     /// Epochs of the detector and of its frames' publisher.
     epoch: u64,
     frame_epoch: u64,
-    /// Of the last belief.
+    /// Of the last belief, and the time that had passed then.
     t_capture_ns: u64,
+    passed_s: f64,
     alarm_count: u32,
     stands: bool,
     alarm_t_ns: u64,
@@ -51,12 +51,16 @@ impl DetectorAlarm {
         self.follow(belief);
         let t_ns = belief.header.t_capture_ns;
         let passed_s = t_ns.saturating_sub(self.t_capture_ns) as f64 * 1e-9;
+        self.passed_s = match self.t_capture_ns {
+            0 => 0.0,
+            _ => passed_s.min(STEP_MAX_S),
+        };
         (self.t_capture_ns, self.alarm_count) = (t_ns, belief.alarm_count);
         let is_silent = belief.alarm == 0 && belief.alarm_count == self.count_before;
         if let Some(lull) = self.lull.as_mut().filter(|_| is_silent) {
             let sees = belief.readiness == Readiness::Armed as u32 && belief.blind == 0;
             let (odds, threshold) = (belief.log_odds, belief.alarm_log_odds);
-            if !sees || !lull.take(odds, threshold, passed_s.min(STEP_MAX_S)) {
+            if !sees || !lull.take(odds, threshold, self.passed_s) {
                 return false;
             }
         }
@@ -97,6 +101,13 @@ impl DetectorAlarm {
                 ..Self::default()
             };
         }
+    }
+
+    /// Time between the last two beliefs of this run as far as it counts, s: a long gap does not
+    /// show what was in it.
+    #[must_use]
+    pub const fn passed_s(&self) -> f64 {
+        self.passed_s
     }
 
     /// True while an alarm is held against what the present detector says.

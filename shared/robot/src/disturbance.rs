@@ -18,7 +18,7 @@ impl DisturbanceSpec {
     /// [`FaultError`] naming the places there are.
     pub(crate) fn place_of(&self, name: &str, robot: &Description) -> Result<usize, FaultError> {
         match self.place {
-            Place::Rover => Err(FaultError::Disturbance {
+            Place::Rover => Err(FaultError::Incomplete {
                 found: format!("{}:{name}", self.name),
                 form: self.form(),
             }),
@@ -66,7 +66,7 @@ impl Disturbance {
         let name = parts.next().unwrap_or_default();
         let kind = DisturbanceKind::named(name).ok_or_else(|| FaultError::form(text))?;
         let spec = kind.spec();
-        let wrong = || FaultError::Disturbance {
+        let wrong = || FaultError::Incomplete {
             found: text.to_owned(),
             form: spec.form(),
         };

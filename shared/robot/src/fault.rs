@@ -45,11 +45,11 @@ pub struct Fault {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FaultError {
     /// The form is wrong.
-    #[error("'{0}' is not a fault; `vigil inject --list` lists what can be injected")]
+    #[error("'{0}' is no fault or disturbance; `vigil inject --list` lists what can be injected")]
     Form(String),
-    /// The form of a disturbance is wrong.
+    /// The kind is known, but the rest of it has another form.
     #[error("'{found}' does not have the form {form}")]
-    Disturbance {
+    Incomplete {
         /// What was given.
         found: String,
         /// Form of this kind.
@@ -113,9 +113,23 @@ impl Fault {
             ["encoder", wheel, "zero"] => (FaultKind::EncoderZero, *wheel),
             ["encoder", wheel, "frozen"] => (FaultKind::EncoderFrozen, *wheel),
             ["encoder", wheel, "noise"] => (FaultKind::EncoderNoise, *wheel),
-            _ => return Err(FaultError::form(text)),
+            [kind, ..] => return Err(Self::form_error(kind, text)),
+            [] => return Err(FaultError::form(text)),
         };
         Self::wheel_of(wheel, robot).map(|wheel| Self { kind, wheel })
+    }
+
+    /// Why a text of this kind is no fault.
+    fn form_error(kind: &str, text: &str) -> FaultError {
+        let form = match kind {
+            "stuck" => "stuck:WHEEL",
+            "encoder" => "encoder:WHEEL:zero|frozen|noise",
+            _ => return FaultError::form(text),
+        };
+        FaultError::Incomplete {
+            found: text.to_owned(),
+            form: form.to_owned(),
+        }
     }
 
     /// Index of a wheel by name, or the error that names the wheels there are.

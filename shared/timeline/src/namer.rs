@@ -61,7 +61,7 @@ impl Namer {
         let since_s = |origin_ns: u64| (event.t_ns as f64 - origin_ns as f64) * 1e-9;
         let has_p = matches!(
             kind,
-            Some(EventKind::Alarm | EventKind::Cleared | EventKind::Diagnosis | EventKind::Action)
+            Some(EventKind::Alarm | EventKind::Diagnosis | EventKind::Action)
         );
         TimelineEntry {
             t_s: origin_ns.map(|ns| (since_s(ns) * 1e6).round() * 1e-6),
@@ -113,7 +113,7 @@ impl Namer {
                 let (channel, evidence) =
                     (evidence_name(&self.robot, event.what as usize), event.p);
                 let runner_up = self.mode(event.value as u32);
-                format!("{channel} says so by {evidence:.1} nat, against {runner_up}")
+                format!("{channel} says so by {evidence:.1} nat; runner-up {runner_up}")
             }
             EventKind::Size => {
                 let kind = SizeKind::from_wire(event.what >> 8);
@@ -168,7 +168,7 @@ impl Namer {
             EventKind::Step => text_of(self.step(event)),
             EventKind::Fault => text_of(self.fault(event)),
             EventKind::Particles => format!("{} of {}", event.what, event.value),
-            EventKind::Refused => "an order that there was nothing to do for".into(),
+            EventKind::Refused => words::refused(event.what).into(),
             EventKind::Watchdog => {
                 let found = WatchdogFinding::from_repr(event.what);
                 found.map_or("?", words::watchdog).into()

@@ -70,7 +70,7 @@ impl NamedWeighing {
         Some(match self.measure.as_str() {
             "votes" => format!("{action} has {size:.2} {word} of the votes"),
             "entropy" => format!("{action} would tell {size:.3} {word}"),
-            _ => format!("{action} would earn {size:.2} {word}"),
+            _ => format!("{action} is worth {size:.2} {word}"),
         })
     }
 }
@@ -102,13 +102,13 @@ mod tests {
         };
         assert_eq!(
             text(named),
-            "STUCK 0.875, ND 0.125; go_on would earn 4.50 less"
+            "STUCK 0.875, ND 0.125; go_on is worth 4.50 less"
         );
         let stands = Weighing {
             second: Some((0, -0.25)),
             ..named
         };
-        assert!(text(stands).ends_with("; go_on would earn 0.25 more"));
+        assert!(text(stands).ends_with("; go_on is worth 0.25 more"));
         let votes = Weighing {
             states: [Some((1, 1.0)), None],
             measure: ValueKind::Votes,

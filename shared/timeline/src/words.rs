@@ -1,7 +1,7 @@
 //! Words of the timeline: symptoms, outcomes, degraded services, blindness, watchdog.
 
 use vigil_blocks::{
-    ActionOutcome, Blindness, Degraded, Event, RecoveryKind, ServiceState, Symptoms,
+    ActionOutcome, Blindness, ControlCommand, Degraded, Event, RecoveryKind, ServiceState, Symptoms,
 };
 use vigil_cycle::watchdog::WatchdogFinding;
 
@@ -76,6 +76,17 @@ pub const fn service_state(state: u32) -> &'static str {
 /// Why the detector is blind.
 pub fn blind(cause: u32) -> &'static str {
     Blindness::from_repr(cause).map_or("?", Blindness::as_str)
+}
+
+/// An order that was not carried out, by its command.
+pub const fn refused(command: u32) -> &'static str {
+    const ACKNOWLEDGE: u32 = ControlCommand::Acknowledge as u32;
+    const FORGET: u32 = ControlCommand::Forget as u32;
+    match command {
+        ACKNOWLEDGE => "acknowledge: there is no such fault to acknowledge",
+        FORGET => "clear: no fault is over",
+        _ => "an order that is not for this service",
+    }
 }
 
 /// What the watchdog has found of a service.

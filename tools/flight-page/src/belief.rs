@@ -35,6 +35,11 @@ impl TimedTrace {
         self.0.add(t_s, value);
     }
 
+    /// The least and the greatest value.
+    pub(crate) const fn bounds(&self) -> Option<[f64; 2]> {
+        self.0.bounds()
+    }
+
     /// The greatest value, or 0.
     pub(crate) fn max(&self) -> f64 {
         self.0.max()

@@ -29,7 +29,9 @@ pub(crate) struct Events {
     first: Vec<Vec<String>>,
     last: std::collections::VecDeque<Vec<String>>,
     ticks: Vec<(f64, Colour)>,
+    /// Those that are told, and how many of them are missed cycles.
     count: usize,
+    misses: usize,
 }
 
 /// Time of day of an instant as RFC 3339 has it, UTC.
@@ -62,6 +64,10 @@ impl Events {
             };
             self.ticks.push((t_s, colour));
         }
+        if entry.is_miss() {
+            self.misses += 1;
+            return;
+        }
         let row = vec![
             time_of_day(rfc3339).to_owned(),
             format!("{t_s:.3}"),
@@ -93,7 +99,7 @@ impl Events {
         }
         let heads = ["time of day, UTC", "s", "service", "what"];
         let mut found = table(&heads, &self.first);
-        let left_out = self.count - self.first.len() - self.last.len();
+        let left_out = self.count - self.misses - self.first.len() - self.last.len();
         if left_out > 0 {
             found.push_str(&remark(&format!(
                 "{left_out} further events are left out here."
@@ -130,6 +136,10 @@ mod tests {
         assert!(table.contains("alarm &lt;999&gt;") && !table.contains("&lt;500&gt;"));
         assert!(table.contains("800 further events"));
         assert_eq!(events.row().ticks.len(), 1000);
+        entry.event = "miss".into();
+        events.take(2000.0, "2023-11-14T22:13:32.345Z", &entry);
+        assert!(events.table().contains("800 further events"));
+        assert_eq!(events.row().ticks.len(), 1001);
         assert_eq!(time_of_day("ä?"), "?");
     }
 }

@@ -7,6 +7,7 @@ mod gaps;
 mod health;
 mod latency;
 mod lives;
+mod measured;
 mod path;
 mod recording;
 mod spans;

@@ -23,8 +23,9 @@ pub(crate) struct FaultLife {
     pub(crate) what: u32,
     /// Its highest probability.
     pub(crate) p: f64,
-    /// When it became active first, s; below 0 before the recording.
-    pub(crate) active_since_s: Option<f64>,
+    /// When it was present first, s; below 0 before the recording.
+    pub(crate) first_s: f64,
+    was_active: bool,
 }
 
 /// What was decided and told of faults.
@@ -84,6 +85,11 @@ impl Lives {
                 life.states.take(t_s, None);
             }
         }
+        let now_ns = faults.header.t_publish_ns;
+        let age_s = |then_ns: u64| match then_ns {
+            0 => 0.0,
+            then_ns => now_ns.saturating_sub(then_ns) as f64 * 1e-9,
+        };
         for record in faults.kept() {
             let Some(state) = record.state().filter(|it| *it != FaultState::Cleared) else {
                 continue;
@@ -99,18 +105,14 @@ impl Lives {
                     source,
                     what,
                     p: 0.0,
-                    active_since_s: None,
+                    first_s: t_s - age_s(record.first_ns),
+                    was_active: false,
                 });
             life.states.take(t_s, Some(state));
             if record.p.is_finite() {
                 life.p = life.p.max(record.p);
             }
-            if is_present(state) && life.active_since_s.is_none() {
-                let now_ns = faults.header.t_publish_ns as f64;
-                let age_s = (now_ns - record.changed_ns as f64) * 1e-9;
-                let is_known = record.changed_ns > 0 && state == FaultState::Active;
-                life.active_since_s = Some(t_s - if is_known { age_s.max(0.0) } else { 0.0 });
-            }
+            life.was_active |= is_present(state);
         }
     }
 
@@ -220,7 +222,7 @@ impl FaultLife {
 
     /// True if it was present at any time of the recording.
     pub(crate) const fn was_present(&self) -> bool {
-        self.active_since_s.is_some()
+        self.was_active
     }
 
     /// From when to when it was present, s.

@@ -21,6 +21,7 @@ use crate::gaps::Gaps;
 use crate::health::Healths;
 use crate::latency::Latencies;
 use crate::lives::{FaultLife, Lives};
+use crate::measured::Measured;
 use crate::path::Path;
 use crate::verdict::{FaultFinding, FaultKind, FileEnd, Findings};
 
@@ -40,6 +41,7 @@ struct Recording {
     beliefs: Beliefs,
     lives: Lives,
     events: Events,
+    measured: Measured,
     path: Path,
     latencies: Latencies,
     healths: Healths,
@@ -84,6 +86,7 @@ impl Recording {
         Self {
             robot_hash: hash(&setup.robot),
             path: Path::new(&setup.robot),
+            measured: Measured::new(&setup.robot),
             setup,
             origin_ns: None,
             end_s: 0.0,
@@ -147,7 +150,11 @@ impl Recording {
             Topic::Sensor => {
                 let frame: SensorFrame = read_block(bytes)?;
                 self.frames += 1;
-                (frame.robot_hash == self.robot_hash).then(|| self.path.take(t_s, &frame))?;
+                let is_ours = frame.robot_hash == self.robot_hash;
+                is_ours.then(|| {
+                    self.path.take(t_s, &frame);
+                    self.measured.take(t_s, &frame);
+                })?;
             }
             Topic::Detection => {
                 let belief: DetectionBelief = read_block(bytes)?;
@@ -218,7 +225,7 @@ impl Recording {
     }
 
     fn finding(&self, life: &FaultLife) -> FaultFinding {
-        let since_s = life.active_since_s.unwrap_or_default();
+        let since_s = life.first_s;
         let presence = life.presence();
         let is_present = life
             .states
@@ -270,9 +277,9 @@ impl Recording {
             ("duration", Some(format!("{:.1} s", self.end_s))),
             ("rate", Some(rate)),
             ("frames", Some(self.frames.to_string())),
-            ("recorded because of", about("reason")),
+            ("why it was recorded", about("reason")),
             ("in words", about("what")),
-            ("the reason came at", about("when")),
+            ("when that was", about("when")),
             (
                 "all causes",
                 about("causes")
@@ -313,6 +320,12 @@ impl Recording {
                 "Timeline",
                 TIMELINE,
                 self.timeline(&time, &alarms),
+            ),
+            section(
+                "measured",
+                "Commands and measurements",
+                MEASURED,
+                self.measured.charts(&time),
             ),
             section("events", "Events", EVENTS, self.events.table()),
             section("path", "Path", PATH, self.path.chart(&faults, &alarms)),
@@ -356,7 +369,10 @@ impl Recording {
 
 const TIMELINE: &str = "All charts have the same axis of time. A fault has one colour everywhere, \
                         in every page. It is drawn if it was ever more probable than 0.05.";
-const EVENTS: &str = "What the services told, in the order of time.";
+const MEASURED: &str =
+    "What the robot was told to do, and what its sensors said, as the graph took it.";
+const EVENTS: &str = "What the services told, in the order of time. Missed cycles are ticks in the \
+                      timeline, and are counted with the health of the services.";
 const PATH: &str = "The measured pose in the plane; both axes have the same scale. Arrows show the \
                     direction, dots the start, the end and each alarm.";
 const LATENCY: &str = "From the instant at which a cycle was due to the publication of its action; \

@@ -4,16 +4,16 @@ mod commands;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
-use vigil_terminal::exit_code;
+use clap::{CommandFactory, Parser, Subcommand};
+use vigil_terminal::{CommandError, CommandTree, Outcome, exit_code};
 
-use commands::{diagnose, evaluate, import, init, learn, pomdp, replay, report, schema};
+use commands::{diagnose, evaluate, frames, import, init, learn, pomdp, replay, report, schema};
 
 /// Learns models, imports logs, diagnoses and scores recorded runs, solves decision models.
 ///
 /// Exit codes: 0 done, 1 the run found or had a failure, 2 usage or configuration error.
 #[derive(Debug, Parser)]
-#[command(version, about, bin_name = "vigil")]
+#[command(version, bin_name = "vigil")]
 struct Args {
     #[command(subcommand)]
     command: Command,
@@ -23,6 +23,7 @@ struct Args {
 enum Command {
     Init(init::Args),
     Import(import::Args),
+    Frames(frames::Args),
     Learn(learn::Args),
     Diagnose(diagnose::Args),
     Evaluate(evaluate::Args),
@@ -33,9 +34,17 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    if let Some(printed) = CommandTree::answer(Args::command()) {
+        return exit_code(
+            printed
+                .map(|()| Outcome::Done)
+                .map_err(CommandError::failure),
+        );
+    }
     exit_code(match Args::parse().command {
         Command::Init(args) => init::run(&args),
         Command::Import(args) => import::run(&args),
+        Command::Frames(args) => frames::run(&args),
         Command::Learn(args) => learn::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
@@ -48,8 +57,6 @@ fn main() -> ExitCode {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     /// The arguments of a command and of those below it.

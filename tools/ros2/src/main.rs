@@ -10,12 +10,12 @@ mod topic_writer;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Monotonic, placement, signal};
 use vigil_flight::{LiveMessages, RosTopic, Subject};
 use vigil_setup::{NotRunning, RunningArgs, RunningGraph};
-use vigil_terminal::{CommandError, Outcome, exit_code};
+use vigil_terminal::{CommandError, CommandTree, Outcome, exit_code};
 
 use crate::network::{Network, NetworkArgs};
 use crate::observer::{Observer, Reason};
@@ -27,7 +27,7 @@ const WAIT: Duration = Duration::from_millis(500);
 ///
 /// It only observes the graph. After the graph's end it says so once, and waits for its next start.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(version)]
 struct Args {
     #[command(flatten)]
     running: RunningArgs,
@@ -46,6 +46,9 @@ struct Args {
 }
 
 fn main() -> ExitCode {
+    if let Some(printed) = CommandTree::answer(Args::command()) {
+        return exit_code(printed.map(|()| Outcome::Done).map_err(CommandError::failure));
+    }
     exit_code(run(&Args::parse()))
 }
 

@@ -6,7 +6,7 @@ use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::Command;
 
-use vigil_terminal::CommandError;
+use vigil_terminal::{CommandError, CommandTree};
 
 /// A program in this one's folder.
 #[derive(Debug, Clone, Copy)]
@@ -31,6 +31,16 @@ pub fn become_program(
         "{}: {error}",
         program.display()
     )))
+}
+
+/// What a program in this one's folder declares.
+///
+/// # Errors
+/// What to build, if it is not there; one that does not answer.
+pub fn commands(program: Program) -> Result<CommandTree, CommandError> {
+    let path = path(program)?;
+    let failed = |error| CommandError::failure(format!("{}: {error}", path.display()));
+    CommandTree::ask(&path).map_err(failed)
 }
 
 /// Path of a program in this one's folder.

@@ -7,15 +7,19 @@ use vigil_terminal::{CommandError, Outcome};
 
 use crate::beside;
 
-/// The program's name.
-const PROGRAM: &str = "vigil-lab";
+/// The program.
+pub const PROGRAM: beside::Program = beside::Program {
+    name: "vigil-lab",
+    build: "-p vigil-lab",
+};
 /// A word that is as like a name as this, by Jaro and Winkler, may be that name. Chosen: swapped,
 /// missing and doubled letters are above it.
 const LIKENESS_MIN: f64 = 0.85;
 /// Its commands, and what each does.
-const COMMANDS: [(&str, &str); 8] = [
+const COMMANDS: [(&str, &str); 9] = [
     ("init", "Writes the files of a new robot, from its log"),
     ("import", "Turns another program's log into frames"),
+    ("frames", "Writes the frames of a recording as a table"),
     ("learn", "Learns a model from recorded frames, or shows one"),
     ("diagnose", "Diagnoses recorded runs"),
     ("evaluate", "Scores the diagnosis on labelled runs"),
@@ -32,11 +36,12 @@ const COMMANDS: [(&str, &str); 8] = [
 
 /// Its documents that have a schema: `vigil-lab schema` prints it. Here, they can be listed without
 /// building that program.
-pub const SCHEMAS: [&str; 19] = [
+pub const SCHEMAS: [&str; 20] = [
     "init",
     "import",
     "import-look",
     "import-suggest",
+    "frames",
     "learn",
     "learn-channels",
     "learn-show",
@@ -56,7 +61,10 @@ pub const SCHEMAS: [&str; 19] = [
 
 /// What the help says of them.
 pub fn help() -> String {
-    let mut text = format!("Commands of {PROGRAM}, built by `cargo build --release`:\n");
+    let mut text = format!(
+        "Commands of {}, built by `cargo build --release`:\n",
+        PROGRAM.name
+    );
     for (name, about) in COMMANDS {
         text.push_str(&format!("  {name:<16} {about}\n"));
     }
@@ -88,11 +96,7 @@ pub fn run(words: &[OsString], own: &clap::Command) -> Result<Outcome, CommandEr
 /// # Errors
 /// A program that is not built.
 pub fn start(words: &[OsString]) -> Result<Outcome, CommandError> {
-    let program = beside::Program {
-        name: PROGRAM,
-        build: "-p vigil-lab",
-    };
-    match beside::become_program(program, words.iter().cloned())? {}
+    match beside::become_program(PROGRAM, words.iter().cloned())? {}
 }
 
 /// The name that is most like a word, if one is like it.

@@ -30,17 +30,18 @@ mod top;
 mod watch;
 
 use std::ffi::OsString;
+use std::os::unix::process::CommandExt;
 use std::process::ExitCode;
 
 use clap::{Arg, CommandFactory, Parser, Subcommand};
 use vigil_launcher::LauncherArgs;
-use vigil_terminal::exit_code;
+use vigil_terminal::{CommandError, Outcome, exit_code};
 
 /// Fault detection, diagnosis and recovery for mobile robots.
 ///
 /// Exit codes: 0 done, 1 the run found or had a failure, 2 usage or configuration error.
 #[derive(Debug, Parser)]
-#[command(version, about, after_help = laboratory::help(), disable_help_subcommand = true)]
+#[command(version, after_help = laboratory::help(), disable_help_subcommand = true)]
 struct Args {
     #[command(subcommand)]
     command: Command,
@@ -87,6 +88,14 @@ fn only_of_the_border(arg: Arg) -> Arg {
     arg.hide(is_other)
 }
 
+/// Becomes the command of these words, asked for its help.
+fn help(words: &[OsString]) -> Result<Outcome, CommandError> {
+    let words = words.iter().cloned().chain(["--help".into()]);
+    let program = std::env::current_exe().map_err(CommandError::failure)?;
+    let error = std::process::Command::new(program).args(words).exec();
+    Err(CommandError::failure(error))
+}
+
 fn main() -> ExitCode {
     exit_code(match Args::parse().command {
         // The launcher understands the same words once more.
@@ -113,6 +122,8 @@ fn main() -> ExitCode {
         Command::Schema(args) => schemas::run(&args),
         Command::Completions(args) => shell::completions(&args, Args::command()),
         Command::Man(args) => shell::man(&args, Args::command()),
+        // Its own would not know the laboratory's commands.
+        Command::Laboratory(words) if words[0] == "help" => help(&words[1..]),
         Command::Laboratory(words) => laboratory::run(&words, &Args::command()),
     })
 }

@@ -9,21 +9,13 @@ use std::time::{Duration, Instant};
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use vigil_blocks::{COMMANDS, Rejection, SensorFrame};
-use vigil_recording::FrameWriter;
-use vigil_recording::frames::{Field, fields};
-use vigil_recording::table::TableError;
-use vigil_robot::Description;
+use vigil_blocks::Rejection;
+use vigil_recording::RunWriter;
 use vigil_setup::GraphArgs;
 use vigil_terminal::{CommandError, Outcome, output};
 
 use crate::publisher;
 
-/// A pause of the capture times after which a new run begins, s: a recording with a longer gap in a
-/// run is refused where it is read.
-const PAUSE_S: f64 = 0.9;
-/// The same in periods of the graph.
-const PAUSE_PERIODS: f64 = 9.0;
 /// What was recorded is told so often.
 const TOLD: Duration = Duration::from_secs(10);
 
@@ -112,22 +104,25 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 fn record_frames(args: &Args, seconds: f64) -> Result<Outcome, CommandError> {
     let mut border = args.graph.border().map_err(CommandError::usage)?;
     border.file.sensor.source = publisher::source(&border).map_err(CommandError::failure)?;
-    let mut recording = Recording::new(&border.robot, border.file.graph.rate_hz, args.path());
+    let mut table = RunWriter::new(&border.robot, border.file.graph.rate_hz, args.path());
+    let mut failed = None;
     if !args.json {
         let graph = &border.file.graph.name;
         eprintln!("recording what publishers send to graph '{graph}'; end with Ctrl-C");
     }
     let mut told = Instant::now();
     let listened = publisher::listen(&border, seconds, &mut |_, arrival, is_taken| {
-        if is_taken {
-            recording.take(&arrival.frame);
+        // After a failure nothing more is written.
+        if is_taken && failed.is_none() {
+            failed = table.write(&arrival.frame).err();
+            if let Some(error) = &failed {
+                eprintln!("error: {error}; nothing more is written: end with Ctrl-C");
+            }
         }
         if told.elapsed() >= TOLD && !args.json {
             told = Instant::now();
-            eprintln!(
-                "{:8.1} s  {} frames",
-                recording.recorded_s, recording.frames
-            );
+            let counts = table.counts();
+            eprintln!("{:8.1} s  {} frames", counts.recorded_s, counts.frames);
         }
     });
     let (heard, unheard) = listened.map_err(CommandError::failure)?;
@@ -140,17 +135,20 @@ fn record_frames(args: &Args, seconds: f64) -> Result<Outcome, CommandError> {
         let cause = Rejection::from_repr(code as u32);
         (cause.map_or("?", Rejection::as_str), *count)
     });
-    let uncommanded = ("no command", recording.without_command);
+    let counts = table.counts();
+    let uncommanded = ("no command", counts.without_command);
     let uncommanded = Some(uncommanded).filter(|(_, count)| *count > 0);
     let document = Document {
         schema_version: 1,
         frames_file: args.path().display().to_string(),
-        frames: recording.frames,
-        runs: recording.runs,
-        recorded_s: recording.recorded_s,
+        frames: counts.frames,
+        runs: counts.runs,
+        recorded_s: counts.recorded_s,
         refused: refused.chain(uncommanded).collect(),
     };
-    recording.finish().map_err(CommandError::failure)?;
+    failed
+        .map_or_else(|| table.finish(), Err)
+        .map_err(CommandError::failure)?;
     if let Some(error) = unheard {
         return Err(CommandError::failure(error));
     }
@@ -176,110 +174,4 @@ fn text(document: &Document) -> String {
     let refused = document.refused.iter();
     lines.extend(refused.map(|(cause, count)| format!("left out: {count} frames ({cause})")));
     lines.join("\n")
-}
-
-/// A file of frames that grows.
-struct Recording<'a> {
-    robot: &'a Description,
-    path: &'a Path,
-    pause_ns: u64,
-    /// Made with the first frame, which says what of the optional channels is measured.
-    file: Option<FrameWriter>,
-    fields: Vec<Field>,
-    run: Option<PresentRun>,
-    runs: u32,
-    frames: u64,
-    recorded_s: f64,
-    /// Frames without the whole command: nothing can be predicted from them.
-    without_command: u64,
-    failed: Option<TableError>,
-}
-
-/// The run to which the last frame belonged; first capture and last, ns.
-struct PresentRun {
-    id: u64,
-    epoch: u64,
-    from_ns: u64,
-    last_ns: u64,
-}
-
-impl<'a> Recording<'a> {
-    fn new(robot: &'a Description, rate_hz: f64, path: &'a Path) -> Self {
-        Self {
-            robot,
-            path,
-            pause_ns: (PAUSE_S.min(PAUSE_PERIODS / rate_hz) * 1e9) as u64,
-            file: None,
-            fields: Vec::new(),
-            run: None,
-            runs: 0,
-            frames: 0,
-            recorded_s: 0.0,
-            without_command: 0,
-            failed: None,
-        }
-    }
-
-    /// Writes a frame; after a failure nothing more.
-    fn take(&mut self, frame: &SensorFrame) {
-        if self.failed.is_some() {
-            return;
-        }
-        if let Err(error) = self.write(frame) {
-            eprintln!("error: {error}; nothing more is written: end with Ctrl-C");
-            self.failed = Some(error);
-        }
-    }
-
-    fn write(&mut self, frame: &SensorFrame) -> Result<(), TableError> {
-        let axes = self.robot.command.len().min(COMMANDS);
-        if (0..axes).any(|axis| frame.commanded(axis).is_none()) {
-            self.without_command += 1;
-            return Ok(());
-        }
-        if self.file.is_none() {
-            let is_there = |field: &Field| !field.is_optional() || field.get(frame).is_some();
-            let all = fields(self.robot).into_iter();
-            let (names, fields) = all.filter(|(_, field)| is_there(field)).unzip();
-            let names: Vec<String> = names;
-            self.fields = fields;
-            self.file = Some(FrameWriter::create(self.path, &names)?);
-        }
-        let now_ns = frame.header.t_capture_ns;
-        let goes_on = |run: &PresentRun| {
-            (run.id, run.epoch) == (frame.run_id, frame.header.epoch)
-                && (run.last_ns + 1..run.last_ns.saturating_add(self.pause_ns)).contains(&now_ns)
-        };
-        let from_ns = match &mut self.run {
-            Some(run) if goes_on(run) => {
-                self.recorded_s += (now_ns - run.last_ns) as f64 * 1e-9;
-                run.last_ns = now_ns;
-                run.from_ns
-            }
-            run => {
-                *run = Some(PresentRun {
-                    id: frame.run_id,
-                    epoch: frame.header.epoch,
-                    from_ns: now_ns,
-                    last_ns: now_ns,
-                });
-                self.runs += 1;
-                now_ns
-            }
-        };
-        self.frames += 1;
-        let t_s = (now_ns - from_ns) as f64 * 1e-9;
-        let values = self.fields.iter().map(|field| field.get(frame));
-        match &mut self.file {
-            Some(file) => file.row(self.runs - 1, t_s, values),
-            None => Ok(()),
-        }
-    }
-
-    fn finish(self) -> Result<(), TableError> {
-        if let Some(error) = self.failed {
-            return Err(error);
-        }
-        self.file.map_or(Ok(()), FrameWriter::finish)
-    }
 }

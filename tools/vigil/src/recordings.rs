@@ -1,20 +1,31 @@
-//! `vigil recordings`: what the black box of a running graph has written.
+//! `vigil recordings`: what the black box of a graph has written.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use vigil_setup::RunningArgs;
+use vigil_setup::{NotRunning, RunningArgs, load_graph};
 use vigil_terminal::{CommandError, Outcome, output};
 use vigil_timeline::unix_time_of_day;
 
-/// Lists the recordings that the black box of a running graph has written, the newest last.
+/// Lists the recordings that the black box of a graph has written, the newest last.
+///
+/// Of a graph that does not run, they are looked for where its graph file says.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
     running: RunningArgs,
+    /// Graph file (TOML) of a graph that does not run.
+    #[arg(
+        long,
+        value_name = "FILE",
+        env = "VIGIL_CONFIG",
+        hide_env_values = true,
+        default_value = "config/rover.toml"
+    )]
+    config: PathBuf,
     /// Print one JSON document.
     #[arg(long)]
     json: bool,
@@ -49,18 +60,24 @@ struct ListedRecording {
 /// Prints them.
 ///
 /// # Errors
-/// A graph that does not run, or has no black box.
+/// A graph that runs without a black box; one that does not run, and of which there is no folder.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let running = args.running.find().map_err(CommandError::failure)?;
-    let graph = running.domain.graph();
-    let folder = fs::read_to_string(running.domain.recordings_file()).map_err(|_| {
-        CommandError::failure(format!("graph '{graph}' has no black box, or not yet"))
-    })?;
+    let (graph, folder) = match args.running.find() {
+        Ok(running) => {
+            let graph = running.domain.graph().to_owned();
+            let folder = fs::read_to_string(running.domain.recordings_file()).map_err(|_| {
+                CommandError::failure(format!("graph '{graph}' has no black box, or not yet"))
+            })?;
+            (graph, PathBuf::from(folder))
+        }
+        Err(why @ (NotRunning::None | NotRunning::Unknown { .. })) => find(args, &why)?,
+        Err(error) => return Err(CommandError::failure(error)),
+    };
     let document = Document {
         schema_version: 1,
-        graph: graph.to_owned(),
-        recordings: listed(Path::new(&folder), graph),
-        folder,
+        recordings: listed(&folder, &graph),
+        graph,
+        folder: folder.display().to_string(),
     };
     let printed = match args.json {
         true => output::json(&document),
@@ -68,6 +85,28 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     };
     printed.map_err(CommandError::failure)?;
     Ok(Outcome::Done)
+}
+
+/// Name and folder of a graph that does not run, for this reason.
+fn find(args: &Args, why: &NotRunning) -> Result<(String, PathBuf), CommandError> {
+    let config = args.config.display();
+    let setup = load_graph(&args.config, |_| {})
+        .map_err(|error| CommandError::failure(format!("{why}; {config}: {error}")))?;
+    let graph = args.running.graph.as_ref();
+    let graph = graph.unwrap_or(&setup.file.graph.name).clone();
+    let candidates = setup.file.blackbox.folders(&setup.path, &graph);
+    let found = candidates.iter().find(|folder| folder.is_dir()).cloned();
+    let found = found.ok_or_else(|| {
+        let names: Vec<String> = candidates
+            .iter()
+            .map(|it| it.display().to_string())
+            .collect();
+        CommandError::failure(format!(
+            "{why}; of graph '{graph}' there are no recordings: none of these is a folder: {}",
+            names.join(", ")
+        ))
+    })?;
+    Ok((graph, found))
 }
 
 fn listed(folder: &Path, graph: &str) -> Vec<ListedRecording> {
@@ -94,11 +133,10 @@ fn listed(folder: &Path, graph: &str) -> Vec<ListedRecording> {
 }
 
 fn text(document: &Document) -> String {
-    let mut lines = vec![document.folder.clone()];
     if document.recordings.is_empty() {
-        lines.push("no recordings".to_owned());
+        return format!("no recordings in {}", document.folder);
     }
-    lines.extend(document.recordings.iter().map(|recording| {
+    let lines = document.recordings.iter().map(|recording| {
         let mib = recording.bytes as f64 / f64::from(1 << 20);
         let time = unix_time_of_day(recording.written_unix_s);
         let time = time.split('.').next().unwrap_or_default();
@@ -106,9 +144,10 @@ fn text(document: &Document) -> String {
             true => "  is being written",
             false => "",
         };
-        format!("  {time}  {mib:7.1} MiB  {}{state}", recording.name)
-    }));
-    lines.join("\n")
+        let path = Path::new(&document.folder).join(&recording.name);
+        format!("{time}  {mib:7.1} MiB  {}{state}", path.display())
+    });
+    lines.collect::<Vec<String>>().join("\n")
 }
 
 #[cfg(test)]
@@ -137,7 +176,7 @@ mod tests {
             recordings,
         };
         let text = text(&document);
-        assert!(text.contains("1.0 MiB  rover-1-alarm.mcap\n"), "{text}");
+        assert!(text.contains("1.0 MiB  f/rover-1-alarm.mcap\n"), "{text}");
         assert!(
             text.ends_with("rover-2-crash.mcap.part  is being written"),
             "{text}"

@@ -6,8 +6,11 @@ use vigil_terminal::{CommandError, Outcome};
 
 use crate::beside;
 
-/// What builds it.
-const BUILD: &str = "--manifest-path tools/ros2/Cargo.toml --target-dir target";
+/// The program.
+pub const PROGRAM: beside::Program = beside::Program {
+    name: "vigil-ros2",
+    build: "--manifest-path tools/ros2/Cargo.toml --target-dir target",
+};
 
 /// Publishes what a running graph says as topics of ROS 2: faults, beliefs, decisions, services.
 ///
@@ -30,9 +33,5 @@ pub struct Args {
 /// # Errors
 /// A program that is not built.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let program = beside::Program {
-        name: "vigil-ros2",
-        build: BUILD,
-    };
-    match beside::become_program(program, args.words.iter().cloned())? {}
+    match beside::become_program(PROGRAM, args.words.iter().cloned())? {}
 }

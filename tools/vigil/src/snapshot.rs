@@ -11,9 +11,10 @@ const LIMIT: Duration = Duration::from_secs(2);
 /// Between two looks.
 const POLL: Duration = Duration::from_millis(10);
 
-/// Has the black box write what the last seconds were, and what follows.
+/// Asks the black box for a recording of the last minute and of what follows.
 ///
-/// It prints the folder in which the recording will lie; `vigil run` says when it is written.
+/// It prints the folder in which the recording will lie. `vigil recordings` lists it, and whether it
+/// is still being written. While an alarm is being recorded, the request is noted in that recording.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]

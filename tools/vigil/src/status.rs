@@ -21,9 +21,9 @@ pub use service::Service;
 pub use state::GraphState;
 pub use text::percent_text;
 
-/// Says how a running graph is: faults, beliefs, the decision, services, times.
+/// Shows the state of a running graph once: faults, beliefs, the decision, services, times.
 ///
-/// Outcome 0 if nothing is wrong and a launcher looks after the graph, else 1.
+/// Exit codes: 0 nothing is wrong and a launcher supervises the graph, else 1.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]

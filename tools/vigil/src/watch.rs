@@ -93,7 +93,7 @@ impl Watch {
             topics.take(&mut self.view, Monotonic.now_ns());
         }
         if self.events.read() {
-            self.view.events = self.events.told();
+            self.view.events = self.events.newest();
         }
         if self.looked.elapsed() >= PROCESSES {
             self.looked = Instant::now();

@@ -95,10 +95,10 @@ fn beside_a_detector_that_arms_nothing_shows_that_an_alarm_has_ended() {
     };
     for step in 1..100 {
         let situation = next(100 * step, Readiness::Arming);
-        assert!(situation.alarm && situation.rests && !situation.is_heard);
+        assert!(situation.alarm && situation.rests && !situation.hearing.is_heard());
         assert_eq!(situation.p_fault, 0.75);
         assert!(
-            situation.may_latch == (step > 55) || (50..=55).contains(&step),
+            situation.hearing.may_latch() == (step > 55) || (50..=55).contains(&step),
             "{step}"
         );
     }
@@ -107,8 +107,11 @@ fn beside_a_detector_that_arms_nothing_shows_that_an_alarm_has_ended() {
         assert!(situation.alarm && !situation.rests);
     }
     let situation = next(10_900, Readiness::Armed);
-    assert_eq!((situation.alarm, situation.is_heard), (false, true));
-    assert!(situation.may_latch);
+    assert_eq!(
+        (situation.alarm, situation.hearing.is_heard()),
+        (false, true)
+    );
+    assert!(situation.hearing.may_latch());
 }
 
 #[test]
@@ -145,12 +148,8 @@ fn an_identifier_that_is_lost_is_waited_for_before_help_is_called() {
     let mut next = |answer: Option<&FaultBelief>| {
         t_ms += 10;
         take(&mut fusion, Some(&detection(t_ms, 1)), answer);
-        let Situation {
-            is_heard,
-            may_latch,
-            ..
-        } = fusion.situation();
-        (is_heard, may_latch)
+        let hearing = fusion.situation().hearing;
+        (hearing.is_heard(), hearing.may_latch())
     };
     assert_eq!(next(Some(&heard)), (true, true));
     assert_eq!([(); 2].map(|()| next(None)), [(true, true); 2]);
@@ -180,7 +179,7 @@ fn an_identifier_that_is_lost_is_waited_for_before_help_is_called() {
             detection: Some(&detection),
         };
         fusion.take(Entry::Frame(inputs), |_| false);
-        assert!(!fusion.situation().is_heard);
+        assert!(!fusion.situation().hearing.is_heard());
     }
 }
 

@@ -22,8 +22,6 @@ use crate::sensors::Sensors;
 const TELLING_LOG_ODDS: f64 = 0.0;
 /// Probability of the unknown, given a fault, from which on no fault is named: even odds.
 const NAMED_ELSE: f64 = 0.5;
-/// Longest time between two frames that counts, s.
-const STEP_MAX_S: f64 = 0.5;
 
 /// What is believed of the components, given that something is wrong.
 #[derive(Debug, Clone, Copy, CheckpointValue)]
@@ -164,9 +162,6 @@ impl ChannelIdentifier {
                 }
                 let t_ns = input.frame.header.t_capture_ns;
                 let dt_s = t_ns.saturating_sub(self.t_ns) as f64 * 1e-9;
-                if self.t_ns != 0 && self.moves {
-                    self.sight.pass(dt_s.min(STEP_MAX_S));
-                }
                 if let Some((detection, _)) = input.detection {
                     self.take(detection, dt_s);
                 }
@@ -255,8 +250,10 @@ impl ChannelIdentifier {
     fn take(&mut self, detection: &DetectionBelief, dt_s: f64) {
         let moves = detection.readiness == Readiness::Armed as u32 && self.t_ns != 0;
         self.moved_s = if moves { dt_s } else { 0.0 };
-        self.moves = moves;
         self.alarm.take(detection);
+        if std::mem::replace(&mut self.moves, moves) {
+            self.sight.pass(self.alarm.passed_s());
+        }
         self.sight.take(self.alarm.stands());
         let mut belief = TreeBelief::watching(self.alarm.p_fault());
         let p_fault = belief.unknown;

@@ -129,7 +129,7 @@ fn what_is_wrong_is_named_with_what_is_allowed() {
     }
     let unknown = parse("gremlin:3").unwrap_err();
     assert!(
-        unknown.starts_with("'gremlin:3' is not a fault; `vigil inject --list`"),
+        unknown.starts_with("'gremlin:3' is no fault or disturbance; `vigil inject --list`"),
         "{unknown}"
     );
     for row in &KINDS {

@@ -4,6 +4,7 @@ mod cross_validation;
 pub mod diagnose;
 pub mod evaluate;
 mod files;
+pub mod frames;
 pub mod import;
 pub mod init;
 mod labelled_runs;

@@ -6,7 +6,7 @@ use vigil_learning::{channel_learning, learning};
 use vigil_terminal::schema::{self, CommandSchema};
 use vigil_terminal::{CommandError, Outcome};
 
-use super::{evaluate, import, init, learn, learn_channels, pomdp, replay};
+use super::{evaluate, frames, import, init, learn, learn_channels, pomdp, replay};
 
 /// Prints the JSON Schema of what a command of the laboratory prints with --json.
 ///
@@ -22,11 +22,12 @@ pub struct Args {
 }
 
 /// The documents, each with its schema. What one command prints in several forms has several names.
-const SCHEMAS: [CommandSchema; 19] = [
+const SCHEMAS: [CommandSchema; 20] = [
     CommandSchema::new::<init::Document>("init"),
     CommandSchema::new::<import::Document>("import"),
     CommandSchema::new::<import::look::Document>("import-look"),
     CommandSchema::new::<import::suggest::Document>("import-suggest"),
+    CommandSchema::new::<frames::Document>("frames"),
     CommandSchema::new::<learn::Document<'_>>("learn"),
     CommandSchema::new::<learn_channels::Document<'_>>("learn-channels"),
     CommandSchema::new::<learn::ShownModel<'_, learning::View>>("learn-show"),

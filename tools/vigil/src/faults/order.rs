@@ -10,7 +10,7 @@ use super::document::{Document, NamedFault};
 use super::view::View;
 use crate::command::send;
 
-/// Says that somebody knows of a fault.
+/// Acknowledges a fault: somebody knows of it.
 ///
 /// One that is active stays until it is over; one that is over is cleared.
 #[derive(Debug, clap::Args)]
@@ -22,7 +22,7 @@ pub struct AckArgs {
     fault: String,
 }
 
-/// Forgets faults that are over.
+/// Removes faults that are over from the list.
 #[derive(Debug, clap::Args)]
 pub struct ClearArgs {
     #[command(flatten)]

@@ -49,7 +49,7 @@ fn line(fault: &NamedFault) -> String {
 pub fn why(fault: &NamedFault) -> String {
     let evidence = fault.evidence.as_ref().map(|it| {
         let (channel, nat, against) = (&it.channel, it.nat, &it.against);
-        format!("{channel} says so by {nat:.1} nat, against {against}")
+        format!("{channel} says so by {nat:.1} nat; runner-up {against}")
     });
     let size = fault.size.as_ref().map(|size| size.text.clone());
     let parts = size.into_iter().chain(evidence);

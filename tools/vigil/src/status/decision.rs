@@ -78,7 +78,7 @@ impl Decision {
         let own = match weighing.measure.as_str() {
             "votes" => format!("has {value:.2} of the votes"),
             "entropy" => format!("leaves {:.3} of doubt", -value),
-            _ => format!("earns {value:.2}"),
+            _ => format!("worth {value:.2}"),
         };
         let second = weighing.second_text();
         second.map_or(own.clone(), |second| format!("{own}; {second}"))

@@ -58,7 +58,7 @@ pub struct Document {
     pub end_to_end: Option<Percentiles>,
     /// What of the frames can be used; null before the first one.
     pub input: Option<Input>,
-    /// The newest events; the newest last.
+    /// The newest events but missed cycles, which are counted in `services`; the newest last.
     pub events: Vec<TimelineEntry>,
 }
 

@@ -39,8 +39,12 @@ pub fn text(document: &Document) -> String {
         entries.sort_by(|a, b| b.1.total_cmp(&a.1));
         let told = entries.iter().take(4);
         let told: Vec<String> = told.map(|(name, p)| format!("{name} {p:.3}")).collect();
+        let healthy = match diagnosis.mode == diagnosis.nominal {
+            true => " (healthy)",
+            false => "",
+        };
         let mode = &diagnosis.mode;
-        lines.push(format!("diagnosis  {mode}; {}", told.join("  ")));
+        lines.push(format!("diagnosis  {mode}{healthy}; {}", told.join("  ")));
     }
     if let Some(decision) = &document.decision {
         let (action, why) = (decision.action_text(), decision.why());
@@ -159,10 +163,10 @@ mod tests {
             [
                 "rover: FAULT, 100 Hz, up 1 min 2 s, launcher 4711",
                 "faults     RM_STUCK active for 3 min, 2 times, p 0.998, compensate",
-                "             stuck; wheel rate RM says so by 5.4 nat, against RM_ENC",
+                "             stuck; wheel rate RM says so by 5.4 nat; runner-up RM_ENC",
                 "detector   p(fault) 0.998; ALARM, alarms so far 1",
                 "diagnosis  RM_STUCK; RM_STUCK 0.998  ND 0.001  UNKNOWN 0.001  LF_STUCK 0.000",
-                "decision   compensate; earns 1.50; go_on would earn 4.50 less",
+                "decision   compensate; worth 1.50; go_on is worth 4.50 less",
                 "           STUCK 0.750  UNKNOWN 0.250  ND 0.000",
             ]
         );

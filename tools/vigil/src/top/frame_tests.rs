@@ -90,7 +90,7 @@ fn a_healthy_graph_says_so() {
             "belief    p(fault)     0.000  ··············                    ▁ armed (0)",
             "          UNKNOWN      0.001  ··············                    ▁",
             "          ND           0.999  ██████████████                    █",
-            "decision  go_on  earns 1.50; slow_down would earn 4.50 less",
+            "decision  go_on  worth 1.50; slow_down is worth 4.50 less",
             "          believed: ND 0.750  UNKNOWN 0.250  STUCK 0.000",
             "services               us worst budget missed over lo/la/re core       us, 60 s",
             "sensor-sim running     24  1529   5000      0    0 0/0/0    0 fifo:50  █████████",
@@ -124,7 +124,7 @@ fn a_fault_comes_first_with_why_and_what_is_done() {
 
 const FAULTY: [&str; 5] = [
     "faults    ! RM_STUCK     ACTIVE  for 3 min  2 times  p 0.998  compensate",
-    "            stuck; wheel rate RM says so by 5.4 nat, against RM_ENC",
+    "            stuck; wheel rate RM says so by 5.4 nat; runner-up RM_ENC",
     "belief    p(fault)     0.998  ██████████████                    █ ALARM (1)",
     "          RM_STUCK     0.998  ██████████████                    █",
     "          UNKNOWN      0.001  ··············                    ▁",
@@ -162,7 +162,7 @@ fn what_is_stale_says_so_and_is_grey() {
         rows.iter().any(|row| row.starts_with("detector   GONE")),
         "{rows:#?}"
     );
-    let expired = "decision  compensate EXPIRED  earns 1.50; go_on would earn 4.50 less";
+    let expired = "decision  compensate EXPIRED  worth 1.50; go_on is worth 4.50 less";
     assert!(rows.iter().any(|row| row == expired), "{rows:#?}");
     assert!(rows[4].ends_with("SILENT"), "{}", rows[4]);
     let grey = (2..24).all(|y| (0..80).all(|x| buffer[(x, y)].fg == Color::Indexed(245)));

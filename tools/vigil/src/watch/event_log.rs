@@ -3,12 +3,13 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
-use vigil_timeline::{EventReader, TimelineEntry, told};
+use vigil_timeline::{EventReader, TimelineEntry};
 
 /// Events that are kept.
 const EVENTS: usize = 200;
 
-/// Reads the events as they are written, and keeps the newest.
+/// Reads the events as they are written, and keeps the newest. Missed cycles would hide all others:
+/// they are told with their service.
 pub struct EventLog {
     reader: EventReader,
     newest: VecDeque<TimelineEntry>,
@@ -27,7 +28,7 @@ impl EventLog {
     pub fn read(&mut self) -> bool {
         let mut has_new = false;
         while let Ok(Some(entry)) = self.reader.next_entry() {
-            if !entry.is_told() {
+            if !entry.is_told() || entry.is_miss() {
                 continue;
             }
             has_new = true;
@@ -39,8 +40,8 @@ impl EventLog {
         has_new
     }
 
-    /// The newest events as people are told them.
-    pub fn told(&mut self) -> Vec<TimelineEntry> {
-        told(self.newest.make_contiguous())
+    /// The newest events, the newest last.
+    pub fn newest(&self) -> Vec<TimelineEntry> {
+        self.newest.iter().cloned().collect()
     }
 }

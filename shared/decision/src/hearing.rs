@@ -1,0 +1,101 @@
+//! Whether the identifier is heard beside an alarm, or another one is waited for.
+
+use vigil_blocks::FaultBelief;
+use vigil_checkpoint::CheckpointValue;
+
+/// Detections in a row without a diagnosis after which the identifier counts as lost, as every
+/// input of a service does (`vigil_cycle`).
+const LOST_AFTER: u32 = 3;
+/// For how long nobody is called once no identifier knows of an alarm, s. Chosen: longer than one
+/// that is replaced takes to begin and to see how a robot in motion fails.
+const RETURN_S: f64 = 5.0;
+
+/// Follows whether the identifier knows of an alarm that stands.
+#[derive(Debug, Clone, Copy, Default, PartialEq, CheckpointValue)]
+pub(crate) struct Hearing {
+    /// The detector's alarm stands.
+    alarm: bool,
+    /// The last diagnosis knows of an alarm.
+    knows: bool,
+    /// Of the last diagnosis, and of the identifier that was heard before the wait.
+    epoch: u64,
+    heard_epoch: u64,
+    /// Detections since the last diagnosis.
+    unanswered: u32,
+    /// Detections beside an alarm in a row without an identifier that knows of it.
+    unheard: u32,
+    /// Time since an identifier is waited for, s; 0 while none is.
+    waited_s: f64,
+}
+
+impl Hearing {
+    /// Beside this alarm of the detector, before any diagnosis.
+    pub(crate) fn beside(alarm: bool) -> Self {
+        Self {
+            alarm,
+            ..Self::default()
+        }
+    }
+
+    /// Takes a sound diagnosis.
+    pub(crate) const fn take_diagnosis(&mut self, diagnosis: &FaultBelief) {
+        self.unanswered = 0;
+        self.epoch = diagnosis.header.epoch;
+        self.knows = diagnosis.identifying != 0;
+    }
+
+    /// Takes a detection `passed_s` after the one before, beside the detector's alarm or none.
+    pub(crate) fn take_detection(&mut self, alarm: bool, is_answered: bool, passed_s: f64) {
+        self.alarm = alarm;
+        let is_unanswered = u32::from(!is_answered);
+        self.unanswered = self.unanswered.saturating_add(is_unanswered);
+        let is_heard = self.is_heard();
+        self.unheard = match is_heard {
+            true => 0,
+            false => self.unheard.saturating_add(1),
+        };
+        // Another one that is heard in its place has not seen all yet.
+        let is_another = self.epoch != self.heard_epoch;
+        let goes_on = alarm && self.waits() && (is_another || !is_heard);
+        self.waited_s = match goes_on || self.unheard >= LOST_AFTER {
+            true => self.waited_s + passed_s,
+            false => 0.0,
+        };
+        if is_heard && self.waited_s == 0.0 {
+            self.heard_epoch = self.epoch;
+        }
+    }
+
+    /// Another run begins: nobody is waited for.
+    pub(crate) const fn begin_run(&mut self) {
+        (self.unheard, self.waited_s) = (0, 0.0);
+    }
+
+    /// An alarm does not stand, or the identifier knows of it. One that was replaced has to see
+    /// something first: until then what was believed before stands.
+    pub(crate) const fn is_heard(&self) -> bool {
+        let knows = self.knows && self.unanswered < LOST_AFTER;
+        knows || !self.alarm
+    }
+
+    /// It is not heard, but for a few cycles only.
+    pub(crate) const fn is_late(&self) -> bool {
+        !self.is_heard() && !self.is_lost()
+    }
+
+    /// It is not heard, and has not been for some cycles.
+    pub(crate) const fn is_lost(&self) -> bool {
+        !self.is_heard() && (self.unheard >= LOST_AFTER || self.waited_s > 0.0)
+    }
+
+    /// Another one is waited for: before its first result what was believed stands.
+    pub(crate) const fn waits(&self) -> bool {
+        self.waited_s > 0.0 && self.waited_s < RETURN_S
+    }
+
+    /// It has been heard for a while, or was not for so long that it is not waited for: help may be
+    /// called.
+    pub(crate) const fn may_latch(&self) -> bool {
+        !self.waits() && (self.waited_s > 0.0 || self.is_heard())
+    }
+}
