@@ -37,11 +37,12 @@ impl Launched {
         folder: &Path,
     ) -> Result<Self, Box<dyn Error>> {
         let [printed, errors] = ["printed.json", "errors.txt"].map(|name| folder.join(name));
+        let events = graph.setup().domain()?.events_file();
         command.stdout(File::create(&printed)?);
         command.stderr(File::create(&errors)?);
         let mut launched = Self {
             launcher: command.spawn()?,
-            events: graph.setup().domain()?.events_file(),
+            events,
             printed,
             errors,
         };
@@ -69,7 +70,7 @@ impl Launched {
     /// Stops it; what it has printed.
     ///
     /// # Errors
-    /// A summary that is none.
+    /// The file system's.
     pub fn stop(self) -> Result<Vec<u8>, Box<dyn Error>> {
         let printed = self.printed.clone();
         drop(self);
@@ -79,7 +80,7 @@ impl Launched {
     /// Stops it; its summary.
     ///
     /// # Errors
-    /// As [`Self::stop`].
+    /// The file system's; a summary that is none.
     pub fn summary(self) -> Result<Value, Box<dyn Error>> {
         Ok(serde_json::from_slice(&self.stop()?)?)
     }

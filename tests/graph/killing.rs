@@ -1,5 +1,6 @@
 //! Each service is killed once: it comes back, the graph goes on, nothing is left behind.
 
+use std::path::PathBuf;
 use std::process::Command;
 
 use vigil_blocks::{Action, FaultBelief, RecoveryKind};
@@ -74,11 +75,36 @@ fn decided_since(summary: &Summary) -> Vec<String> {
     since.collect()
 }
 
+/// Sets of services that die together beside a stuck wheel, one after the other.
+const DEATHS: [&[&str]; 5] = [
+    &["supervisor"],
+    &["detector"],
+    &["identifier", "supervisor"],
+    &["detector", "identifier"],
+    &["detector", "identifier", "supervisor"],
+];
+
 #[test]
 fn while_services_are_replaced_nobody_drives_on_with_a_stuck_wheel_nor_calls_for_help() {
+    replaced_beside_a_stuck_wheel("config/rover.toml".into(), "replaced", &DEATHS);
+}
+
+#[test]
+fn the_same_holds_where_the_pose_alone_is_measured() {
+    let folder = std::env::temp_dir().join(unique("replaced-pose"));
+    let config = config_with(&folder, |text| {
+        let changed = text.replacen("[detector]", "[detector]\nsensors = \"pose\"", 1);
+        assert_ne!(changed, text);
+        changed
+    });
+    replaced_beside_a_stuck_wheel(config, "replaced-pose", &DEATHS[3..]);
+    let _ = std::fs::remove_dir_all(folder);
+}
+
+fn replaced_beside_a_stuck_wheel(config: PathBuf, name: &str, deaths: &[&[&str]]) {
     let _machine = machine();
     let options = ["--duration", "90", "--inject", "stuck:RM@2"];
-    let mut graph = RunningGraph::start("replaced", &options);
+    let mut graph = RunningGraph::start_with(config, name, &options);
     let observed = graph.observe();
     let mut health = HealthWatch::new(&observed);
     let mut actions = observed.receiver::<Action>(Topic::Action).unwrap();
@@ -98,13 +124,7 @@ fn while_services_are_replaced_nobody_drives_on_with_a_stuck_wheel_nor_calls_for
         });
     };
     compensates(500_000_000);
-    for services in [
-        &["supervisor"][..],
-        &["detector"],
-        &["identifier", "supervisor"],
-        &["detector", "identifier"],
-        &["detector", "identifier", "supervisor"],
-    ] {
+    for services in deaths {
         replace(&mut health, services);
         compensates(4_000_000_000);
     }

@@ -15,7 +15,7 @@ import unittest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "python"))
 
 import numpy
-from harness import EXAMPLES, ROOT, WATCHDOG_S, Graph, wait_for
+from harness import BINARIES, EXAMPLES, ROOT, WATCHDOG_S, Graph, wait_for
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from PIL import Image
@@ -138,8 +138,18 @@ class Rerun(unittest.TestCase):
         return list(message.name), end_ns
 
     def test_a_recording_is_decoded(self):
+        self.assert_decoded(self.recording)
+
+    def test_a_recording_that_was_cut_and_mended_is_decoded(self):
+        cut, mended = (pathlib.Path(self.home) / name for name in ["cut.mcap", "mended.mcap"])
+        content = self.recording.read_bytes()
+        cut.write_bytes(content[: len(content) * 3 // 4])
+        self.run_program(BINARIES / "vigil", "mend", cut, "--out", mended)
+        self.assert_decoded(mended)
+
+    def assert_decoded(self, recording):
         converted = pathlib.Path(self.home) / "flight.rrd"
-        self.rerun("mcap", "convert", self.recording, "--output", converted)
+        self.rerun("mcap", "convert", recording, "--output", converted)
         self.rerun("rrd", "verify", converted)
         said = self.rerun("rrd", "print", "-v", converted)
         # Decoded, not only kept as bytes: numbers as curves, messages by their fields.

@@ -10,7 +10,9 @@ use vigil_cycle::{Clock, Monotonic, clock};
 use super::half::{Deadlines, Half, Span, State};
 use super::process::Process;
 use crate::chain::STAGE_NAMES;
-use crate::latency::cycles::join;
+use crate::latency::attribution::{Record, was_machine_late};
+use crate::latency::canary::{Canary, CanaryRecord};
+use crate::latency::cycles::{Cycle, join};
 use crate::latency::graph::{Change, GraphFile, GraphRun};
 use crate::launched::Launched;
 
@@ -18,6 +20,9 @@ use crate::launched::Launched;
 const SETTLE: Duration = Duration::from_secs(1);
 /// Cycles at the start that are no steady state.
 const WARM_UP: Duration = Duration::from_secs(2);
+/// The machine is late in a cycle if it holds canaries up for longer, ns. Chosen: a quarter of
+/// what a cycle takes; beyond it a cycle says more of the machine than of the black box.
+const LATE_NS: u64 = 50_000;
 /// Time around a half, s: to settle, to end a black box, to start another.
 const AROUND_S: f64 = 10.0;
 
@@ -55,9 +60,16 @@ impl Plan {
         let seconds = 4.0 * self.rounds as f64 * (self.seconds + AROUND_S);
         let launched = Launched::start(&graph, graph.command(seconds, folder), folder)?;
         std::thread::sleep(WARM_UP);
+        let canaries = graph.canaries(seconds)?;
         let spans = self.spans(&graph)?;
+        let canaries: Vec<_> = canaries.into_iter().map(Canary::finish).collect();
+        let canaries: Option<Vec<CanaryRecord>> = canaries.into_iter().collect();
+        let canaries = canaries.ok_or("a canary has died")?;
+        if canaries.iter().any(|canary| canary.not_kept > 0) {
+            return Err("canaries had no room for all late wake-ups".into());
+        }
         let ran = GraphRun::read(&launched.stop()?, folder)?;
-        Self::split(&graph, &ran, spans)
+        Self::split(&graph, &ran, spans, &canaries)
     }
 
     /// Brings the black box into each state by turns.
@@ -117,7 +129,12 @@ impl Plan {
     }
 
     /// Each span with what the services did in it.
-    fn split(graph: &GraphFile, ran: &GraphRun, spans: Vec<Span>) -> Result<Run, Box<dyn Error>> {
+    fn split(
+        graph: &GraphFile,
+        ran: &GraphRun,
+        spans: Vec<Span>,
+        canaries: &[CanaryRecord],
+    ) -> Result<Run, Box<dyn Error>> {
         for name in STAGE_NAMES {
             if ran.summary["services"][name]["restarts"] != 0 {
                 return Err(format!("{name} was restarted in the run").into());
@@ -131,11 +148,10 @@ impl Plan {
             frame_ns: graph.stage_deadline_ns(0),
             action_ns: graph.deadline_ns(),
         };
-        let half = |span| {
-            Half::new(span, &cycles, deadlines, |at_ns| {
-                frames.get(&at_ns).copied()
-            })
-        };
+        let canaries: Vec<Record<'_>> = canaries.iter().map(Record::from_canary).collect();
+        let was_published = |at_ns: u64| frames.get(&at_ns).copied();
+        let was_late = |cycle: &Cycle| was_machine_late(cycle, LATE_NS, &canaries);
+        let half = |span| Half::new(span, &cycles, deadlines, was_published, was_late);
         let halves: Vec<Half> = spans.into_iter().map(half).collect();
         match halves.iter().all(|half| half.cycles > 0) {
             true => Ok(Run { halves }),

@@ -72,11 +72,15 @@ pub struct Half {
     pub span: Span,
     /// Instants of the schedule.
     pub cycles: u64,
-    /// From the schedule to the action, us: p50 and p99.
+    /// Instants in whose cycle the machine was late, as canaries say.
+    pub machine_late: u64,
+    /// From the schedule to the action, us, of cycles in which it was on time: p50 and p99.
     pub latency_us: [f64; 2],
-    /// Instants past the last deadline although their frame was in time.
+    /// The same of all cycles.
+    pub latency_of_all_us: [f64; 2],
+    /// Instants past the last deadline although their frame and the machine were in time.
     pub own_misses: u64,
-    /// Instants past the last deadline of which the frame was late or never came.
+    /// Others past the last deadline.
     pub other_misses: u64,
 }
 
@@ -91,31 +95,43 @@ pub struct Deadlines {
 
 impl Half {
     /// Of the cycles that were due in a span; `cycles` is in order, `was_published` says when the
-    /// frame of an instant was.
+    /// frame of an instant was, `was_late` whether the machine was late in a cycle.
     pub fn new(
         span: Span,
         cycles: &[Cycle],
         deadlines: Deadlines,
         was_published: impl Fn(u64) -> Option<u64>,
+        was_late: impl Fn(&Cycle) -> bool,
     ) -> Self {
         let begin = cycles.partition_point(|cycle| cycle.t_schedule_ns < span.from_ns);
         let end = cycles.partition_point(|cycle| cycle.t_schedule_ns < span.until_ns);
         let own = &cycles[begin..end.max(begin)];
-        let took_us = own.iter().map(|cycle| cycle.end_to_end_ns() as f64 * 1e-3);
-        let mut took_us: Vec<f64> = took_us.collect();
+        let percentiles_us = |cycles: &[&Cycle]| {
+            let took_us = cycles
+                .iter()
+                .map(|cycle| cycle.end_to_end_ns() as f64 * 1e-3);
+            let mut took_us: Vec<f64> = took_us.collect();
+            [0.5, 0.99].map(|q| quantile(&mut took_us, q))
+        };
+        let all: Vec<&Cycle> = own.iter().collect();
+        let in_time: Vec<&Cycle> = own.iter().filter(|cycle| !was_late(cycle)).collect();
         let missed = own
             .iter()
             .filter(|cycle| cycle.end_to_end_ns() > deadlines.action_ns);
         let is_own = |cycle: &&Cycle| {
-            was_published(cycle.t_schedule_ns)
-                .is_some_and(|at_ns| at_ns <= cycle.t_schedule_ns + deadlines.frame_ns)
+            let published_ns = was_published(cycle.t_schedule_ns);
+            let is_frame_in_time =
+                published_ns.is_some_and(|at_ns| at_ns <= cycle.t_schedule_ns + deadlines.frame_ns);
+            is_frame_in_time && !was_late(cycle)
         };
         let missed: Vec<&Cycle> = missed.collect();
         let own_misses = missed.iter().copied().filter(is_own).count() as u64;
         Self {
             span,
             cycles: own.len() as u64,
-            latency_us: [0.5, 0.99].map(|q| quantile(&mut took_us, q)),
+            machine_late: (all.len() - in_time.len()) as u64,
+            latency_us: percentiles_us(&in_time),
+            latency_of_all_us: percentiles_us(&all),
             own_misses,
             other_misses: missed.len() as u64 - own_misses,
         }
@@ -125,6 +141,12 @@ impl Half {
     #[must_use]
     pub fn seconds(&self) -> f64 {
         self.span.until_ns.saturating_sub(self.span.from_ns) as f64 * 1e-9
+    }
+
+    /// Share of cycles in which the machine was late, %.
+    #[must_use]
+    pub fn machine_late_percent(&self) -> f64 {
+        100.0 * self.machine_late as f64 / self.cycles.max(1) as f64
     }
 
     /// Own misses in 100,000 cycles.
@@ -137,9 +159,12 @@ impl Half {
     #[must_use]
     pub fn document(&self) -> Value {
         let [p50_us, p99_us] = self.latency_us;
+        let [all_p50_us, all_p99_us] = self.latency_of_all_us;
         json!({
             "round": self.span.round, "state": self.span.state.name(), "cycles": self.cycles,
-            "p50_us": p50_us, "p99_us": p99_us, "own_misses": self.own_misses,
+            "p50_us": p50_us, "p99_us": p99_us, "all_p50_us": all_p50_us,
+            "all_p99_us": all_p99_us, "machine_late": self.machine_late,
+            "own_misses": self.own_misses,
             "other_misses": self.other_misses, "memory_bytes": self.span.memory_bytes,
             "ring_bytes": self.span.ring_bytes, "cpu_s": self.span.cpu_s,
         })
@@ -188,10 +213,19 @@ mod tests {
             action_ns: 500,
         };
         let late = |at_ns| Some(at_ns + if at_ns == 3000 { 400 } else { 10 });
-        let half = Half::new(span, &cycles, deadlines, late);
+        let half = Half::new(span, &cycles, deadlines, late, |_| false);
         assert_eq!((half.cycles, half.own_misses, half.other_misses), (3, 1, 1));
         assert_eq!(half.latency_us[0], 0.6);
-        let never = Half::new(span, &cycles, deadlines, |_| None);
+        assert_eq!(
+            (half.latency_of_all_us, half.machine_late),
+            (half.latency_us, 0)
+        );
+        let was_late = |cycle: &Cycle| cycle.t_schedule_ns == 2000;
+        let half = Half::new(span, &cycles, deadlines, late, was_late);
+        assert_eq!((half.cycles, half.own_misses, half.other_misses), (3, 0, 2));
+        assert_eq!((half.machine_late, half.latency_of_all_us[0]), (1, 0.6));
+        assert!(half.latency_us[0] < 0.6);
+        let never = Half::new(span, &cycles, deadlines, |_| None, |_| false);
         assert_eq!((never.own_misses, never.other_misses), (0, 2));
     }
 }

@@ -47,6 +47,18 @@ impl Run {
         logs.map(f64::exp)
     }
 
+    /// The same of all cycles, whatever the machine did.
+    fn ratio_of_all(&self, state: State, percentile: usize) -> [f64; 3] {
+        let logs = self.more(state, |half| half.latency_of_all_us[percentile].ln());
+        logs.map(f64::exp)
+    }
+
+    /// Share of cycles in which the machine was late, %, more than in the same round without a
+    /// black box.
+    fn machine_late_more(&self, state: State) -> [f64; 3] {
+        self.more(state, Half::machine_late_percent)
+    }
+
     /// Own misses in 100,000 cycles.
     fn misses(&self, state: State) -> [f64; 3] {
         bootstrap(&self.all(state, Half::own_per_100_000))
@@ -73,6 +85,10 @@ pub fn document(plan: &Plan, run: &Run) -> Value {
             "p99_us": run.median(state, |half| half.latency_us[1]),
             "p50_over_off": bounded(run.ratio(state, 0)),
             "p99_over_off": bounded(run.ratio(state, 1)),
+            "all_p50_over_off": bounded(run.ratio_of_all(state, 0)),
+            "all_p99_over_off": bounded(run.ratio_of_all(state, 1)),
+            "machine_late_percent": run.median(state, Half::machine_late_percent),
+            "machine_late_percent_more": bounded(run.machine_late_more(state)),
             "own_misses_per_100_000": bounded(run.misses(state)),
             "own_misses_per_100_000_more": bounded(run.misses_more(state)),
             "cycles": run.halves_in(state).map(|half| half.cycles).sum::<u64>(),
@@ -97,16 +113,18 @@ pub fn document(plan: &Plan, run: &Run) -> Value {
 pub fn table(run: &Run) -> Vec<String> {
     let mut lines = vec![
         "| black box | p50, us | over off | p99, us | over off | own misses in 100,000 \
-         | more than off | of others | memory, MiB | ring, MiB | of a core, % |"
+         | more than off | other misses | machine late, % | more than off | all: p50 over off \
+         | p99 over off | memory, MiB | ring, MiB | of a core, % |"
             .to_owned(),
-        "|---|---|---|---|---|---|---|---|---|---|---|".to_owned(),
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|".to_owned(),
     ];
     let bounded = |decimals: usize, [mean, low, high]: [f64; 3]| {
         format!("{mean:.decimals$} [{low:.decimals$}, {high:.decimals$}]")
     };
     lines.extend(State::ALL.map(|state| {
         format!(
-            "| {} | {:.1} | {} | {:.1} | {} | {} | {} | {} | {:.1} | {:.0} | {} |",
+            "| {} | {:.1} | {} | {:.1} | {} | {} | {} | {} | {:.1} | {} | {} | {} | {:.1} | {:.0} \
+             | {} |",
             state.name(),
             run.median(state, |half| half.latency_us[0]),
             bounded(3, run.ratio(state, 0)),
@@ -117,6 +135,10 @@ pub fn table(run: &Run) -> Vec<String> {
             run.halves_in(state)
                 .map(|half| half.other_misses)
                 .sum::<u64>(),
+            run.median(state, Half::machine_late_percent),
+            bounded(1, run.machine_late_more(state)),
+            bounded(3, run.ratio_of_all(state, 0)),
+            bounded(3, run.ratio_of_all(state, 1)),
             run.median(state, |half| half.span.memory_bytes as f64 / MIB),
             run.median(state, |half| half.span.ring_bytes as f64 / MIB),
             bounded(1, run.cpu_percent(state)),

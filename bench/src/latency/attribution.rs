@@ -92,6 +92,14 @@ fn covered_ns(mut stretches: Vec<[u64; 2]>) -> u64 {
     covered_ns
 }
 
+/// True if between a cycle's schedule and its end canaries were overdue for longer than this, ns.
+#[must_use]
+pub fn was_machine_late(cycle: &Cycle, longest_ns: u64, canaries: &[Record<'_>]) -> bool {
+    let (from_ns, to_ns) = (cycle.t_schedule_ns, cycle.t_done_ns);
+    let overdue = canaries.iter().flat_map(|c| c.overdue(from_ns, to_ns));
+    covered_ns(overdue.collect()) > longest_ns
+}
+
 /// The cycles done more than `deadline_ns` after their schedule, each attributed.
 #[must_use]
 pub fn misses(cycles: &[Cycle], deadline_ns: u64, canaries: &[Record<'_>]) -> Vec<Miss> {

@@ -60,8 +60,10 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
          (SIGKILL) at the beginning and replaced, which rescues what was kept. The order changes \
          from round to round. From the schedule to the action, by the services' own stamps: the \
          median over the rounds, and the geometric mean of the ratios within rounds. Brackets: \
-         95 %, by a bootstrap over the rounds. Own: past the deadline, although the frame was in \
-         time; more than off: the differences within rounds. The first second after an \
+         95 %, by a bootstrap over the rounds. A canary on each core, above the services, says in \
+         which cycles the machine was late by more than 50 us: percentiles are of the others; \
+         all: of all cycles. Own: past the deadline, although frame and machine were in time; \
+         more than off: the differences within rounds. The first second after an \
          orderly start or end of the black box is left out; what \
          follows a signal counts from its instant.\n",
         args.rate

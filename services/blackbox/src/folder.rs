@@ -1,14 +1,19 @@
 //! The folder of a graph's recordings: names, and a bound on their sum.
 
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
+use vigil_flight::{FlightError, Mended};
 use vigil_setup::RunningGraph;
+
+use crate::say::say;
 
 /// How a recording ends that is not finished.
 const PART: &str = ".mcap.part";
+/// How one ends that is being made whole.
+const MENDING: &str = ".mcap.mending";
 /// How one ends that is.
 const WHOLE: &str = ".mcap";
 /// How the name of one ends that was cut short, and of one that nothing but missed cycles is the
@@ -69,10 +74,26 @@ impl RecordingsFolder {
     }
 
     /// Gives recordings a proper name that a process has left unfinished: they can be read as far
-    /// as they go. Nobody may be writing.
+    /// as they go.
     pub fn adopt_parts(&self) -> Vec<PathBuf> {
         let parts = self.files(PART).into_iter();
-        parts.filter_map(|part| adopt(&part.path)).collect()
+        let left = parts.filter(|part| !is_being_written(&part.path));
+        left.filter_map(|part| adopt(&part.path)).collect()
+    }
+
+    /// Gives those an end that were cut short, so that every program can open them; what is damaged
+    /// stays as it is.
+    pub fn mend_cut(&self) {
+        for begun in self.files(MENDING) {
+            let _ = fs::remove_file(begun.path);
+        }
+        let cut = self.files(&format!("{CUT}{WHOLE}"));
+        for file in cut.iter().filter(|file| !is_being_written(&file.path)) {
+            if let Ok(Mended { damage: None, .. }) = file.mend() {
+                let name = file.path.display();
+                say(&format!("{name} has an end: every program can open it"));
+            }
+        }
     }
 
     /// Removes recordings until the others, and `more` bytes, are within the bound: those that
@@ -124,6 +145,12 @@ impl RecordingsFolder {
     }
 }
 
+/// True while somebody writes the file: its writer holds a lock.
+fn is_being_written(path: &Path) -> bool {
+    let file = File::open(path);
+    file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+}
+
 /// Gives an unfinished recording a proper name; one without content is removed.
 pub fn adopt(part: &Path) -> Option<PathBuf> {
     if fs::metadata(part).is_ok_and(|metadata| metadata.len() == 0) {
@@ -151,6 +178,25 @@ struct RecordingFile {
 }
 
 impl RecordingFile {
+    /// Makes it whole; it is as old as it was.
+    fn mend(&self) -> Result<Mended, FlightError> {
+        let begun = self.path.with_extension("mcap.mending");
+        let mended = vigil_flight::mend(&self.path, &begun)?;
+        if mended.damage.is_some() {
+            let _ = fs::remove_file(begun);
+            return Ok(mended);
+        }
+        let replaced = File::open(&begun)
+            .and_then(|file| file.set_modified(self.modified))
+            .and_then(|()| fs::rename(&begun, &self.path));
+        replaced
+            .map(|()| mended)
+            .map_err(|source| FlightError::File {
+                path: self.path.clone(),
+                source,
+            })
+    }
+
     fn is_of_misses(&self) -> bool {
         let name = self.path.file_stem().unwrap_or_default();
         let name = name.to_string_lossy();
@@ -161,7 +207,10 @@ impl RecordingFile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use vigil_flight::part_path;
+    use vigil_blocks::{Block, SensorFrame};
+    use vigil_cycle::Topic;
+    use vigil_flight::{FlightWriter, part_path};
+    use vigil_timeline::WallClock;
 
     fn folder(path: &Path, bytes_max: u64) -> RecordingsFolder {
         RecordingsFolder::open(&[path.to_owned()], "rover", bytes_max).unwrap()
@@ -233,6 +282,43 @@ mod tests {
             left(&folder),
             ["mine.mcap.part", &format!("{name}-cut.mcap")]
         );
+    }
+
+    #[test]
+    fn what_was_cut_short_gets_an_end_unless_somebody_writes_it() {
+        let temporary = tempfile::tempdir().unwrap();
+        let folder = folder(temporary.path(), 1000);
+        let whole = folder.name("2026-11-28T18:00:01.250Z", "alarm");
+        let config = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/rover.toml");
+        let graph = vigil_setup::load_graph(Path::new(config), |_| {}).unwrap();
+        let mut writer = FlightWriter::create(&whole, &graph, WallClock::ahead_by(0)).unwrap();
+        assert!(is_being_written(&part_path(&whole)));
+        assert!(folder.adopt_parts().is_empty());
+        for second in 1..4 {
+            let t_ns = second * 1_000_000_000;
+            let mut frame = SensorFrame::default();
+            frame.header.schema = SensorFrame::SCHEMA;
+            frame.header.t_publish_ns = t_ns;
+            writer
+                .block(Topic::Sensor, bytemuck::bytes_of(&frame))
+                .unwrap();
+        }
+        writer.finish().unwrap();
+        let content = fs::read(&whole).unwrap();
+        fs::remove_file(&whole).unwrap();
+        fs::write(part_path(&whole), &content[..content.len() - 100]).unwrap();
+        let cut = folder.adopt_parts().remove(0);
+        let old = SystemTime::UNIX_EPOCH + Duration::from_secs(1_700_000_000);
+        let file = fs::File::options().write(true).open(&cut).unwrap();
+        file.set_modified(old).unwrap();
+        file.lock().unwrap();
+        folder.mend_cut();
+        assert!(!vigil_flight::has_end(&cut).unwrap(), "somebody writes it");
+        drop(file);
+        folder.mend_cut();
+        assert!(vigil_flight::has_end(&cut).unwrap());
+        assert_eq!(fs::metadata(&cut).unwrap().modified().unwrap(), old);
+        assert_eq!(left(&folder).len(), 1);
     }
 
     #[test]

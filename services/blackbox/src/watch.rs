@@ -38,6 +38,7 @@ pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     // Also of a process before this one: each start would write a recording otherwise.
     let since_misses_ns = folder.since_misses().map(|time| time.as_nanos() as u64);
     let miss_ns = since_misses_ns.and_then(|since_ns| Monotonic.now_ns().checked_sub(since_ns));
+    let cut_before = folder.clone();
     let material = Arc::new(Material::new(running, Destination::Folder(folder))?);
     material.destination.prune(0);
     let domain = &material.running.domain;
@@ -46,6 +47,8 @@ pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     }
     let ring = begin(&material.running);
     let mut rescues = Rescue::start_all(domain);
+    // Beside the rest: it may take long, and ends with this process.
+    thread::spawn(move || cut_before.mend_cut());
     let kept = ring.map_err(Into::into);
     let kept = kept.and_then(|ring| keep(&material, ring, miss_ns, &mut rescues));
     if kept.is_ok() {

@@ -1,12 +1,12 @@
 //! The service processes: start, restart, stop.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
-use vigil_cycle::{Clock, Domain, Monotonic, RunReport, signal};
+use vigil_cycle::{Clock, Domain, FoundProcess, Monotonic, RunReport, signal};
 
 use crate::companion::{Companion, CompanionNews};
 use crate::error::LauncherError;
@@ -21,6 +21,13 @@ use crate::restarts::{Death, RestartHistory};
 const STOP_LIMIT: Duration = Duration::from_secs(3);
 /// Time that a killed one may take to be gone.
 const KILL_LIMIT: Duration = Duration::from_secs(1);
+
+/// True of the command line of this service or black box, but for one that only rescues.
+fn is_service(words: &[String], name: &str) -> bool {
+    let program = words.first().and_then(|word| Path::new(word).file_name());
+    let is_it = program.is_some_and(|program| program == format!("vigil-{name}").as_str());
+    is_it && !words.iter().any(|word| word == "--rescue")
+}
 
 /// One service process.
 struct ServiceProcess {
@@ -74,10 +81,16 @@ impl Children {
         locks: Locks,
     ) -> Result<Self, LauncherError> {
         let (mut children, listed) = (Self::none(domain, locks), domain.processes());
+        // Whoever was killed may have started one that it had no time to list.
+        let members = domain.members();
+        let unlisted = |name: &str| {
+            let is_it = |process: &&FoundProcess| is_service(&process.words(), name);
+            members.iter().find(is_it).cloned()
+        };
         for name in plan.services() {
             let found = listed.services.iter().find(|(of, _)| *of == name);
             let found = found.and_then(|(_, pid)| domain.find_process(*pid));
-            let process = match found {
+            let process = match found.or_else(|| unlisted(name.as_str())) {
                 Some(process) => Process::found(process),
                 None => {
                     let (began_ns, drive) = (Monotonic.now_ns(), observer.drive());
@@ -89,6 +102,10 @@ impl Children {
             children.add(plan, name, process);
         }
         let found = listed.blackbox.and_then(|pid| domain.find_process(pid));
+        let found = match plan.setup.file.blackbox.enabled {
+            true => found.or_else(|| unlisted("blackbox")),
+            false => found,
+        };
         children.blackbox = Some(Companion::start(plan, domain, found));
         let list = domain.launcher_file();
         let listed = children.list();

@@ -47,6 +47,21 @@ impl FoundProcess {
         self.pid
     }
 
+    /// Its command line; empty once it has ended.
+    #[must_use]
+    pub fn words(&self) -> Vec<String> {
+        let text = fs::read(format!("/proc/{}/cmdline", self.pid)).unwrap_or_default();
+        let words = text
+            .split(|byte| *byte == 0)
+            .filter(|word| !word.is_empty());
+        let words = words.map(|word| String::from_utf8_lossy(word).into_owned());
+        if self.lives() {
+            words.collect()
+        } else {
+            Vec::new()
+        }
+    }
+
     /// False once it has ended.
     #[must_use]
     pub fn lives(&self) -> bool {
@@ -100,12 +115,14 @@ mod tests {
         let found = domain.find_process(service.id()).unwrap();
         assert!(domain.members().contains(&found));
         assert_eq!((found.id(), found.lives()), (service.id(), true));
+        assert_eq!(found.words(), ["sleep", "3600"]);
         found.terminate();
         // Not reaped yet, it is there and lives no more.
         while found.lives() {
             std::thread::yield_now();
         }
         assert_eq!(domain.find_process(service.id()), None);
+        assert!(found.words().is_empty());
         service.wait().unwrap();
         found.kill();
         stranger.kill().unwrap();

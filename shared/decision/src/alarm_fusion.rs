@@ -26,7 +26,7 @@ pub const fn fused_alarm(detection: &DetectionBelief, action: Option<&Action>) -
 }
 
 /// What decisions depend on besides beliefs.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Situation {
     /// The detector is blind: no belief counts.
     pub is_blind: bool,
@@ -97,7 +97,7 @@ impl AlarmFusion {
                 self.detected = DetectorAlarm::default();
                 self.readiness = Readiness::Arming as u32;
                 (self.p_nominal, self.faults) = (1.0, 0);
-                self.hearing = Hearing::default();
+                self.hearing.reset();
             }
             return entry;
         };

@@ -66,6 +66,15 @@ impl Hearing {
         }
     }
 
+    /// Nothing is known but who was heard.
+    pub(crate) fn reset(&mut self) {
+        *self = Self {
+            epoch: self.epoch,
+            heard_epoch: self.heard_epoch,
+            ..Self::default()
+        };
+    }
+
     /// Another run begins: nobody is waited for.
     pub(crate) const fn begin_run(&mut self) {
         (self.unheard, self.waited_s) = (0, 0.0);

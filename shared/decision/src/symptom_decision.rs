@@ -347,8 +347,20 @@ impl DecisionRule for SymptomDecision {
         self.process.improve();
     }
 
-    fn restore(&mut self, left: &Carryover, _: Option<&FaultBelief>) {
+    fn restore(&mut self, left: &Carryover, believed: Option<&FaultBelief>) {
         self.process.restore(left, &mut self.latch);
+        let believed = believed.filter(|_| left.detected_t_capture_ns != 0);
+        let believed = believed.filter(|it| self.is_sound(it));
+        if let (Some(believed), Some(hardware)) = (believed, &mut self.hardware) {
+            let (answerable, belief) = (self.wheels.answerable(), self.process.tracker.belief());
+            let stands = Situation {
+                alarm: true,
+                ..Situation::default()
+            };
+            hardware.take(believed, answerable, stands, belief);
+            self.wheels.take(believed);
+            self.take_over(0.0);
+        }
     }
 
     fn is_sound(&self, diagnosis: &FaultBelief) -> bool {

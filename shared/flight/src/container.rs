@@ -74,6 +74,15 @@ pub fn part_path(path: &Path) -> PathBuf {
     name.into()
 }
 
+/// How files are written, but for their chunks.
+pub(crate) fn options() -> WriteOptions {
+    WriteOptions::new()
+        .compression(None)
+        .profile("ros2")
+        .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
+        .disable_seeking(true)
+}
+
 impl Container {
     /// An empty file.
     pub(crate) fn create(path: &Path) -> Result<Self, FlightError> {
@@ -83,20 +92,16 @@ impl Container {
             source,
         };
         let file = File::create(&part_path).map_err(failed)?;
+        // Nobody mends what is still being written. A file system without locks has none.
+        let _ = file.try_lock();
         let stream = BufWriter::new(file.try_clone().map_err(failed)?);
-        let options = WriteOptions::new()
-            .compression(None)
-            .profile("ros2")
-            .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
+        let writer = options()
             .chunk_size(None)
-            .disable_seeking(true);
-        let writer =
-            options
-                .create(NoSeek::new(stream))
-                .map_err(|source| FlightError::Container {
-                    path: part_path.clone(),
-                    source,
-                })?;
+            .create(NoSeek::new(stream))
+            .map_err(|source| FlightError::Container {
+                path: part_path.clone(),
+                source,
+            })?;
         Ok(Self {
             writer,
             file,

@@ -51,6 +51,12 @@ pub enum FlightError {
         /// The name of the compression.
         how: String,
     },
+    /// The file has an end: there is nothing to mend.
+    #[error("{} is whole", path.display())]
+    Whole {
+        /// The file.
+        path: PathBuf,
+    },
     /// What stands in the file is not what was written.
     #[error("{} is damaged: {what}", path.display())]
     Damaged {

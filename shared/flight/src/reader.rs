@@ -16,7 +16,7 @@ use crate::container::{FOREIGN, LIBRARY, RAW};
 use crate::error::FlightError;
 
 /// Largest record that is read, bytes. A chunk has some 1 MiB, and so has the graph's document.
-const RECORD_BYTES_MAX: usize = 64 << 20;
+pub(crate) const RECORD_BYTES_MAX: usize = 64 << 20;
 /// Code and length that stand before each record, bytes.
 const RECORD_HEAD: usize = 9;
 /// What stands in a chunk before its records, if it is not compressed, bytes.
@@ -24,7 +24,9 @@ const CHUNK_HEAD: usize = 40;
 /// The attachment that holds what the graph ran on.
 const DOCUMENT: &str = "document.toml";
 /// The metadata that say why the file was written.
-const ABOUT: &str = "vigil";
+pub(crate) const ABOUT: &str = "vigil";
+/// What they say of a file that was cut short, and has an end since.
+pub(crate) const CUT: &str = "cut";
 
 /// One thing that was recorded. Times are since 1970.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,7 +100,7 @@ fn content(name: &str) -> Option<Content> {
 
 /// True if an attachment has room for all that it says it has. The container's own reader takes
 /// this for granted.
-fn is_attachment_whole(bytes: &[u8]) -> bool {
+pub(crate) fn is_attachment_whole(bytes: &[u8]) -> bool {
     // Two times; then name and type, each after its length; then length and checksum.
     let skip_text = |at: usize| {
         let length = bytes.get(at..at.checked_add(4)?)?.try_into().ok()?;
@@ -166,10 +168,11 @@ impl FlightReader {
         &self.about
     }
 
-    /// True once the file was found to end before its end.
+    /// True once the file was found to end before its end, or to have been cut short before it was
+    /// mended.
     #[must_use]
-    pub const fn is_cut(&self) -> bool {
-        self.is_cut
+    pub fn is_cut(&self) -> bool {
+        self.is_cut || self.about.contains_key(CUT)
     }
 
     /// How many blocks and events of another version were passed over so far.

@@ -10,7 +10,7 @@ use bytemuck::bytes_of;
 use proptest::prelude::*;
 use vigil_blocks::{Block, DetectionBelief, Header, Health, SensorFrame};
 use vigil_cycle::topic::{ServiceName, Topic};
-use vigil_flight::{FlightError, FlightReader, FlightWriter, Recorded, read_block};
+use vigil_flight::{FlightError, FlightReader, FlightWriter, Recorded, mend, read_block};
 use vigil_timeline::{TimelineEntry, WallClock};
 
 const MS: u64 = 1_000_000;
@@ -113,6 +113,29 @@ fn what_was_written_is_read_in_its_order() {
     assert_eq!(reader.next().unwrap(), None, "the end stays the end");
 }
 
+/// A cut file can be made whole: it holds the same, says that it was cut, and has an end and an
+/// index for other readers.
+fn assert_mended(cut: &Path, before: &FlightReader, found: &[Entry]) {
+    let whole = cut.with_extension("whole");
+    if found.is_empty() {
+        let error = mend(cut, &whole).unwrap_err().to_string();
+        assert!(error.ends_with("nothing in it is whole") && !whole.exists());
+        return;
+    }
+    let mended = mend(cut, &whole).unwrap();
+    assert_eq!(mended.damage, None);
+    assert!(matches!(mend(&whole, cut), Err(FlightError::Whole { .. })));
+    let content = fs::read(&whole).unwrap();
+    assert!(mcap::Summary::read(&content).unwrap().is_some());
+    let others = mcap::MessageStream::new(&content).unwrap();
+    assert!(others.map(Result::unwrap).count() >= found.len());
+    let mut reader = FlightReader::open(&whole).unwrap();
+    assert_eq!(read(&mut reader).unwrap(), found);
+    assert!(reader.is_cut());
+    assert_eq!(reader.document(), before.document());
+    assert_eq!(reader.about().get("reason"), before.about().get("reason"));
+}
+
 #[test]
 fn a_file_that_is_cut_gives_its_whole_chunks_and_its_document() {
     let folder = tempfile::tempdir().unwrap();
@@ -132,6 +155,7 @@ fn a_file_that_is_cut_gives_its_whole_chunks_and_its_document() {
         assert!(found.is_empty() || reader.document().is_some());
         assert_eq!(found[..], told[..found.len()]);
         counts.push(found.len());
+        assert_mended(&cut, &reader, &found);
     }
     assert!(counts.is_sorted());
     assert_eq!(counts.last(), Some(&told.len()));
@@ -224,6 +248,11 @@ proptest! {
         fs::write(&path, &content).unwrap();
         if let Ok(mut reader) = FlightReader::open(&path) {
             let _ = read(&mut reader);
+        }
+        let whole = path.with_extension("whole");
+        if mend(&path, &whole).is_ok() {
+            let mended = fs::read(&whole).unwrap();
+            prop_assert!(mcap::Summary::read(&mended).unwrap().is_some());
         }
     }
 }

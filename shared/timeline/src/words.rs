@@ -82,9 +82,13 @@ pub fn blind(cause: u32) -> &'static str {
 pub const fn refused(command: u32) -> &'static str {
     const ACKNOWLEDGE: u32 = ControlCommand::Acknowledge as u32;
     const FORGET: u32 = ControlCommand::Forget as u32;
+    const INJECT: u32 = ControlCommand::Inject as u32;
+    const CLEAR: u32 = ControlCommand::Clear as u32;
     match command {
         ACKNOWLEDGE => "acknowledge: there is no such fault to acknowledge",
         FORGET => "clear: no fault is over",
+        INJECT => "inject: not allowed, or not possible",
+        CLEAR => "inject clear: not allowed, or nothing to mend",
         _ => "an order that is not for this service",
     }
 }

@@ -12,6 +12,10 @@ use vigil_setup::{Setup, fault_name};
 
 use crate::spans::{Span, Spans};
 
+/// An alarm that rose at most so long before a fault was seen is about it, s. Chosen: longer than
+/// blocks of faults are apart and an identifier takes for a first doubt.
+const ALARM_BEFORE_S: f64 = 1.0;
+
 /// The life of one fault.
 #[derive(Debug)]
 pub(crate) struct FaultLife {
@@ -23,9 +27,8 @@ pub(crate) struct FaultLife {
     pub(crate) what: u32,
     /// Its highest probability.
     pub(crate) p: f64,
-    /// When it was present first, s; below 0 before the recording.
-    pub(crate) first_s: f64,
-    was_active: bool,
+    /// Since when it was present when it first became active, s; below 0 before the recording.
+    pub(crate) since_s: Option<f64>,
 }
 
 /// What was decided and told of faults.
@@ -34,6 +37,8 @@ pub(crate) struct Lives {
     detector_alarm: Spans<()>,
     standing_alarm: Spans<()>,
     faults: BTreeMap<(u32, u32), FaultLife>,
+    /// Of each fault that is present, by its number: since when, s.
+    began_s: BTreeMap<u64, f64>,
     action: Spans<(String, bool)>,
     overall: Option<OverallState>,
 }
@@ -85,11 +90,7 @@ impl Lives {
                 life.states.take(t_s, None);
             }
         }
-        let now_ns = faults.header.t_publish_ns;
-        let age_s = |then_ns: u64| match then_ns {
-            0 => 0.0,
-            then_ns => now_ns.saturating_sub(then_ns) as f64 * 1e-9,
-        };
+        self.follow_presence(t_s, faults);
         for record in faults.kept() {
             let Some(state) = record.state().filter(|it| *it != FaultState::Cleared) else {
                 continue;
@@ -105,14 +106,47 @@ impl Lives {
                     source,
                     what,
                     p: 0.0,
-                    first_s: t_s - age_s(record.first_ns),
-                    was_active: false,
+                    since_s: None,
                 });
             life.states.take(t_s, Some(state));
             if record.p.is_finite() {
                 life.p = life.p.max(record.p);
             }
-            life.was_active |= is_present(state);
+            if is_present(state) && life.since_s.is_none() {
+                life.since_s = Some(self.began_s.get(&record.number).copied().unwrap_or(t_s));
+            }
+        }
+    }
+
+    /// Follows since when each fault is present without a break, by its number: what was unknown
+    /// and has a name since is the same fault.
+    fn follow_presence(&mut self, t_s: f64, faults: &Faults) {
+        let is_there = |record: &&FaultRecord| {
+            let state = record.state();
+            state.is_some_and(|state| state == FaultState::Pending || is_present(state))
+        };
+        self.began_s.retain(|number, _| {
+            let mut there = faults.kept().filter(is_there);
+            there.any(|record| record.number == *number)
+        });
+        // An alarm that rose just before is about it.
+        let alarm = self.standing_alarm.all().last().map(|span| span.from_s);
+        let alarm_s = alarm.filter(|from_s| t_s - from_s <= ALARM_BEFORE_S);
+        for record in faults.kept().filter(is_there) {
+            let is_of_robot = record.source == FaultSource::Robot as u32;
+            let seen_s = match record.state() {
+                // Told of before the recording began, or before this block.
+                Some(FaultState::Active) if record.changed_ns > 0 => {
+                    let now_ns = faults.header.t_publish_ns;
+                    t_s - now_ns.saturating_sub(record.changed_ns) as f64 * 1e-9
+                }
+                _ => t_s,
+            };
+            let began_s = alarm_s
+                .filter(|_| is_of_robot)
+                .unwrap_or(seen_s)
+                .min(seen_s);
+            self.began_s.entry(record.number).or_insert(began_s);
         }
     }
 
@@ -222,7 +256,7 @@ impl FaultLife {
 
     /// True if it was present at any time of the recording.
     pub(crate) const fn was_present(&self) -> bool {
-        self.was_active
+        self.since_s.is_some()
     }
 
     /// From when to when it was present, s.

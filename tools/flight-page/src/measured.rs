@@ -39,7 +39,8 @@ struct PoseSpeed {
     places: [usize; 2],
     /// Time, x and y of the last moments.
     last: VecDeque<[f64; 3]>,
-    resets: u32,
+    /// Run, and count of the pose's resets: only within one pair is a difference a way.
+    frame_of_pose: (u64, u32),
     series: Series,
 }
 
@@ -48,7 +49,7 @@ impl PoseSpeed {
         Self {
             places,
             last: VecDeque::new(),
-            resets: 0,
+            frame_of_pose: (0, 0),
             series: Series::new("speed over ground, by the measured pose, m/s", "speed"),
         }
     }
@@ -58,8 +59,9 @@ impl PoseSpeed {
         let Some((x, y)) = x.zip(y).filter(|(x, y)| x.is_finite() && y.is_finite()) else {
             return self.last.clear();
         };
-        if frame.pose_reset_count != self.resets {
-            self.resets = frame.pose_reset_count;
+        let frame_of_pose = (frame.run_id, frame.pose_reset_count);
+        if frame_of_pose != self.frame_of_pose {
+            self.frame_of_pose = frame_of_pose;
             self.last.clear();
         }
         while self

@@ -225,7 +225,7 @@ impl Recording {
     }
 
     fn finding(&self, life: &FaultLife) -> FaultFinding {
-        let since_s = life.first_s;
+        let since_s = life.since_s.unwrap_or_default();
         let presence = life.presence();
         let is_present = life
             .states

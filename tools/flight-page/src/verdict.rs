@@ -23,7 +23,7 @@ pub(crate) enum FaultKind {
 pub(crate) struct FaultFinding {
     pub(crate) kind: FaultKind,
     pub(crate) name: String,
-    /// When it was present first, s; below 0 before the recording.
+    /// When it began, s; below 0 before the recording.
     pub(crate) since_s: f64,
     /// The same by the calendar.
     pub(crate) clock: String,

@@ -7,7 +7,9 @@ use std::process::ExitCode;
 use clap::{CommandFactory, Parser, Subcommand};
 use vigil_terminal::{CommandError, CommandTree, Outcome, exit_code};
 
-use commands::{diagnose, evaluate, frames, import, init, learn, pomdp, replay, report, schema};
+use commands::{
+    diagnose, evaluate, frames, import, init, learn, mend, pomdp, replay, report, schema,
+};
 
 /// Learns models, imports logs, diagnoses and scores recorded runs, solves decision models.
 ///
@@ -29,6 +31,7 @@ enum Command {
     Evaluate(evaluate::Args),
     Report(report::Args),
     Replay(replay::Args),
+    Mend(mend::Args),
     Pomdp(pomdp::Args),
     Schema(schema::Args),
 }
@@ -50,6 +53,7 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Mend(args) => mend::run(&args),
         Command::Pomdp(args) => pomdp::run(&args),
         Command::Schema(args) => schema::run(&args),
     })
@@ -63,6 +67,41 @@ mod tests {
     fn arguments(command: &clap::Command) -> Vec<&clap::Arg> {
         let below = command.get_subcommands().flat_map(arguments);
         command.get_arguments().chain(below).collect()
+    }
+
+    /// Of a command and of those below it: its name, and the help of each of its options.
+    fn helps(command: &clap::Command) -> Vec<String> {
+        let below = command
+            .get_subcommands()
+            .filter(|it| it.get_name() != "help");
+        let own = command.get_arguments().filter(|it| !it.is_hide_set());
+        let own = own.map(|arg| {
+            let help = arg.get_long_help().or(arg.get_help());
+            let help = help.map(ToString::to_string);
+            format!(
+                "{} {arg} {help:?} {:?}",
+                command.get_name(),
+                arg.get_default_values()
+            )
+        });
+        own.chain(below.flat_map(helps)).collect()
+    }
+
+    #[test]
+    fn another_program_can_show_every_command_and_option() {
+        let mut program = Args::command();
+        program.build();
+        let mut shown = CommandTree::new(&program).command();
+        shown.build();
+        let found = helps(&shown);
+        let wanted: Vec<String> = helps(&program)
+            .into_iter()
+            .filter(|help| !help.contains(" --version ") && !help.contains(" --help "))
+            .collect();
+        assert!(wanted.len() > 100, "{}", wanted.len());
+        for help in &wanted {
+            assert!(found.contains(help), "{help} is not among {found:#?}");
+        }
     }
 
     #[test]

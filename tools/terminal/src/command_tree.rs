@@ -35,6 +35,8 @@ struct OptionEntry {
     values: Vec<String>,
     choices: Vec<Choice>,
     default: Vec<String>,
+    /// The environment's variable that it is read from.
+    env: Option<String>,
     is_required: bool,
     takes_many: bool,
     is_counted: bool,
@@ -88,6 +90,10 @@ impl CommandTree {
     /// One that cannot be started, or does not answer.
     pub fn ask(program: &Path) -> io::Result<Self> {
         let output = process::Command::new(program).arg(WORD).output()?;
+        if !output.status.success() {
+            let said = String::from_utf8_lossy(&output.stderr);
+            return Err(io::Error::other(format!("{}: {said}", output.status)));
+        }
         Ok(serde_json::from_slice(&output.stdout)?)
     }
 
@@ -140,6 +146,9 @@ impl OptionEntry {
             }
             .map(|value| value.to_string_lossy().into_owned())
             .collect(),
+            env: arg
+                .get_env()
+                .map(|name| name.to_string_lossy().into_owned()),
             is_required: arg.is_required_set(),
             takes_many: arg
                 .get_num_args()
@@ -163,6 +172,10 @@ impl OptionEntry {
         }
         if let Some(help) = self.long_help {
             arg = arg.long_help(help);
+        }
+        if let Some(name) = self.env {
+            let name: &'static str = name.leak();
+            arg = arg.env(name).hide_env_values(true);
         }
         if self.is_counted {
             return arg.action(ArgAction::Count);

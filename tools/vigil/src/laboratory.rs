@@ -16,7 +16,7 @@ pub const PROGRAM: beside::Program = beside::Program {
 /// missing and doubled letters are above it.
 const LIKENESS_MIN: f64 = 0.85;
 /// Its commands, and what each does.
-const COMMANDS: [(&str, &str); 9] = [
+const COMMANDS: [(&str, &str); 10] = [
     ("init", "Writes the files of a new robot, from its log"),
     ("import", "Turns another program's log into frames"),
     ("frames", "Writes the frames of a recording as a table"),
@@ -28,6 +28,7 @@ const COMMANDS: [(&str, &str); 9] = [
         "replay",
         "Computes a recording again, and compares it bit by bit",
     ),
+    ("mend", "Makes a recording whole that was cut short"),
     (
         "pomdp",
         "Checks, solves, compares and learns decision models",

@@ -62,6 +62,7 @@ struct ListedRecording {
 /// # Errors
 /// A graph that runs without a black box; one that does not run, and of which there is no folder.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let mut is_running = true;
     let (graph, folder) = match args.running.find() {
         Ok(running) => {
             let graph = running.domain.graph().to_owned();
@@ -70,12 +71,15 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             })?;
             (graph, PathBuf::from(folder))
         }
-        Err(why @ (NotRunning::None | NotRunning::Unknown { .. })) => find(args, &why)?,
+        Err(why @ (NotRunning::None | NotRunning::Unknown { .. })) => {
+            is_running = false;
+            find(args, &why)?
+        }
         Err(error) => return Err(CommandError::failure(error)),
     };
     let document = Document {
         schema_version: 1,
-        recordings: listed(&folder, &graph),
+        recordings: listed(&folder, &graph, is_running),
         graph,
         folder: folder.display().to_string(),
     };
@@ -95,7 +99,10 @@ fn find(args: &Args, why: &NotRunning) -> Result<(String, PathBuf), CommandError
     let graph = args.running.graph.as_ref();
     let graph = graph.unwrap_or(&setup.file.graph.name).clone();
     let candidates = setup.file.blackbox.folders(&setup.path, &graph);
-    let found = candidates.iter().find(|folder| folder.is_dir()).cloned();
+    let mut there = candidates.iter().filter(|folder| folder.is_dir());
+    let has_any = |folder: &&PathBuf| !listed(folder, &graph, false).is_empty();
+    let with_any = there.clone().find(has_any);
+    let found = with_any.or_else(|| there.next()).cloned();
     let found = found.ok_or_else(|| {
         let names: Vec<String> = candidates
             .iter()
@@ -109,7 +116,7 @@ fn find(args: &Args, why: &NotRunning) -> Result<(String, PathBuf), CommandError
     Ok((graph, found))
 }
 
-fn listed(folder: &Path, graph: &str) -> Vec<ListedRecording> {
+fn listed(folder: &Path, graph: &str, is_running: bool) -> Vec<ListedRecording> {
     let begin = format!("{graph}-");
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let recordings = entries.filter_map(|entry| {
@@ -117,14 +124,14 @@ fn listed(folder: &Path, graph: &str) -> Vec<ListedRecording> {
             entry.file_name().into_string().ok()?,
             entry.metadata().ok()?,
         );
-        let is_being_written = name.ends_with(".mcap.part");
-        let is_ours = name.starts_with(&begin) && (is_being_written || name.ends_with(".mcap"));
+        let is_part = name.ends_with(".mcap.part");
+        let is_ours = name.starts_with(&begin) && (is_part || name.ends_with(".mcap"));
         let written = metadata.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
         is_ours.then_some(ListedRecording {
             name,
             bytes: metadata.len(),
             written_unix_s: written.as_secs_f64(),
-            is_being_written,
+            is_being_written: is_part && is_running,
         })
     });
     let mut recordings: Vec<ListedRecording> = recordings.collect();
@@ -166,7 +173,7 @@ mod tests {
             fs::write(folder.path().join(name), [0; 1 << 20]).unwrap();
             std::thread::sleep(std::time::Duration::from_millis(10));
         }
-        let recordings = listed(folder.path(), "rover");
+        let recordings = listed(folder.path(), "rover", true);
         let names: Vec<_> = recordings.iter().map(|it| it.name.as_str()).collect();
         assert_eq!(names, ["rover-1-alarm.mcap", "rover-2-crash.mcap.part"]);
         let document = Document {

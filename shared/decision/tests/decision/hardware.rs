@@ -308,3 +308,28 @@ fn an_identifier_that_is_late_by_a_cycle_calls_nobody() {
     assert_eq!(robot.supervisor.latched(), None);
     assert!(robot.p("STUCK") + robot.p("STUCK_NEW") > 0.9);
 }
+
+#[test]
+fn what_was_told_is_believed_over_the_death_of_the_supervisor() {
+    let mut robot = Navigation::joint();
+    robot.rest(1.0, 0);
+    alarm_alone(&mut robot);
+    robot.identify("RM_STUCK", 0.99);
+    robot.rest(1.0, 0);
+    assert_eq!(robot.kind(), RecoveryKind::Compensate);
+    let (left, told) = (robot.supervisor.carryover(), robot.diagnosis);
+    // Another supervisor, and an identifier that has seen nothing yet.
+    let mut next = Navigation::joint();
+    next.supervisor.restore(&left, Some(&told));
+    next.detection = robot.detection;
+    alarm_alone(&mut next);
+    next.diagnosis.header.t_capture_ns = told.header.t_capture_ns;
+    next.cycle(0);
+    for _ in 0..300 {
+        next.cycle(0);
+        assert!([RecoveryKind::Stop, RecoveryKind::Compensate].contains(&next.kind()));
+    }
+    assert_eq!(next.kind(), RecoveryKind::Compensate);
+    assert_eq!(next.action.stuck_wheels, 1 << 4);
+    assert_eq!(next.supervisor.latched(), None);
+}

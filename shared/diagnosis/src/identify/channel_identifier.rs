@@ -187,7 +187,7 @@ impl ChannelIdentifier {
         self.t_ns = 0;
         // An alarm of this run stands on.
         self.alarm.begin_run(self.run_id);
-        self.sight = OnsetSight::default();
+        (self.sight, self.moves) = (OnsetSight::default(), false);
         if self.alarm.stands() {
             self.sight.take(true);
         }

@@ -14,9 +14,10 @@ use vigil_terminal::{CommandError, Outcome, output};
 
 /// Writes the frames of a recording as a table, to learn from, to diagnose or to play back.
 ///
-/// A column for each command and channel; a pause or another run of the robot begins a new run. Exit
-/// codes: 0 done, 1 the recording holds no frames of its robot, or is damaged: then what comes
-/// before is written.
+/// A column for each command and channel; a pause or another run of the robot begins a new run.
+///
+/// Exit codes: 0 done, 1 the recording holds no frames of its robot, or is damaged: then what
+/// comes before is written.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A recording of the black box, such as `vigil recordings` lists.
@@ -58,6 +59,9 @@ pub struct Document {
 /// # Errors
 /// A file that is no recording; a table that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    if is_same(&args.recording, &args.out) {
+        return Err(CommandError::usage("--out names the recording itself"));
+    }
     let document = write(&args.recording, &args.out)?;
     let printed = match args.json {
         true => output::json(&document),
@@ -68,6 +72,12 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         true => Outcome::Done,
         false => Outcome::Failed,
     })
+}
+
+/// True of two names of one file.
+fn is_same(one: &Path, other: &Path) -> bool {
+    let real = [one, other].map(|path| path.canonicalize().ok());
+    real[0].is_some() && real[0] == real[1]
 }
 
 fn write(recording: &Path, out: &Path) -> Result<Document, CommandError> {

@@ -11,6 +11,7 @@ mod labelled_runs;
 pub mod learn;
 pub mod learn_channels;
 mod learn_task;
+pub mod mend;
 mod offline;
 pub mod pomdp;
 pub mod replay;
