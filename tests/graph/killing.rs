@@ -90,15 +90,8 @@ fn while_services_are_replaced_nobody_drives_on_with_a_stuck_wheel_nor_calls_for
 }
 
 #[test]
-fn the_same_holds_where_the_pose_alone_is_measured() {
-    let folder = std::env::temp_dir().join(unique("replaced-pose"));
-    let config = config_with(&folder, |text| {
-        let changed = text.replacen("[detector]", "[detector]\nsensors = \"pose\"", 1);
-        assert_ne!(changed, text);
-        changed
-    });
-    replaced_beside_a_stuck_wheel(config, "replaced-pose", &DEATHS[3..]);
-    let _ = std::fs::remove_dir_all(folder);
+fn the_same_holds_where_yaw_rate_and_currents_are_measured_too() {
+    replaced_beside_a_stuck_wheel("config/rover-all.toml".into(), "replaced-all", &DEATHS[3..]);
 }
 
 fn replaced_beside_a_stuck_wheel(config: PathBuf, name: &str, deaths: &[&[&str]]) {

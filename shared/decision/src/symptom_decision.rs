@@ -360,6 +360,9 @@ impl DecisionRule for SymptomDecision {
             hardware.take(believed, answerable, stands, belief);
             self.wheels.take(believed);
             self.take_over(0.0);
+            // What is not heard of yet calls nobody.
+            self.latch.keep_open(true);
+            self.choose();
         }
     }
 
