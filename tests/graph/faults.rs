@@ -62,7 +62,9 @@ fn a_fault_lives_from_its_onset_until_it_is_cleared_and_outlives_the_supervisor(
     assert!(fault["evidence"]["nat"].as_f64().unwrap() > 0.0);
     let channels = fault["freeze_frame"]["channels"].as_array().unwrap();
     assert!(
-        channels.iter().any(|pair| pair[0] == "enc_RM"),
+        channels
+            .iter()
+            .any(|one| one["name"] == "enc_RM" && one["unit"] == "rad/s"),
         "{channels:?}"
     );
     let (code, _, err) = vigil(&name, &["ack", "LM_STUCK"]);

@@ -4,6 +4,7 @@
 //! library.
 
 use std::error::Error;
+use std::iter;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -106,7 +107,10 @@ fn show(args: &Args, outcomes: &[Outcome<'_>], document: &Value) -> Result<(), B
         println!("\n{last}\nNot archived: only a part was measured.");
         return Ok(());
     }
-    let mut archive = Archive::new("field")?;
+    // A part has a name of its own, so that it does not stand for the whole.
+    let parts = args.only.iter().map(|name| name.replace('/', "-"));
+    let words: Vec<String> = iter::once("field".to_owned()).chain(parts).collect();
+    let mut archive = Archive::new(&words.join("-"))?;
     archive.store("field.json", document)?;
     let table = lines(outcomes);
     archive.store_text("table.md", &format!("{}\n", table.join("\n")))?;

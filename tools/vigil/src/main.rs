@@ -39,6 +39,9 @@ use vigil_terminal::{CommandError, Outcome, exit_code};
 
 /// Fault detection, diagnosis and recovery for mobile robots.
 ///
+/// A graph is what watches one robot: four services, their launcher and a black box. `vigil run`
+/// starts one and stays with it; the other commands look at one that runs, or at what it has left.
+///
 /// Exit codes: 0 done, 1 the run found or had a failure, 2 usage or configuration error.
 #[derive(Debug, Parser)]
 #[command(version, after_help = laboratory::help(), disable_help_subcommand = true)]

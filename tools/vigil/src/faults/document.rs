@@ -100,10 +100,20 @@ pub struct NamedEvidence {
 pub struct FreezeFrame {
     /// Capture time, ns of the publisher's clock.
     pub t_capture_ns: u64,
-    /// The measured channels by name, in their units.
-    pub channels: Vec<(String, f64)>,
-    /// The command, by place; null where it was not known.
-    pub command: Vec<Option<f64>>,
+    /// The measured channels.
+    pub channels: Vec<NamedValue>,
+    /// The command, as far as it was known.
+    pub command: Vec<NamedValue>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct NamedValue {
+    /// Name of the channel, or of the command's axis.
+    pub name: String,
+    /// In `unit`.
+    pub value: f64,
+    /// The unit; empty if it has none.
+    pub unit: String,
 }
 
 /// An instant of `CLOCK_MONOTONIC` on the clock of the wall.
@@ -239,11 +249,18 @@ impl FreezeFrame {
     fn new(record: &FaultRecord, setup: &Setup) -> Option<Self> {
         let places = channels(&setup.robot).into_iter().enumerate();
         let measured = places.filter(|(at, _)| record.channel_valid >> at & 1 == 1);
-        let channels = measured.map(|(at, channel)| (channel.name, record.channel[at]));
-        let axes = u32::BITS - record.command_valid.leading_zeros();
-        let known = |at: usize| record.command_valid >> at & 1 == 1;
-        let command = record.command.iter().take(axes as usize).enumerate();
-        let command = command.map(|(at, value)| Some(*value).filter(|_| known(at)));
+        let channels = measured.map(|(at, channel)| NamedValue {
+            name: channel.name,
+            value: record.channel[at],
+            unit: channel.unit,
+        });
+        let axes = setup.robot.command.iter().zip(&record.command).enumerate();
+        let known = axes.filter(|(at, _)| record.command_valid >> at & 1 == 1);
+        let command = known.map(|(_, (axis, value))| NamedValue {
+            name: axis.name.clone(),
+            value: *value,
+            unit: axis.unit.clone(),
+        });
         (record.frame_t_capture_ns != 0).then(|| Self {
             t_capture_ns: record.frame_t_capture_ns,
             channels: channels.collect(),
