@@ -40,6 +40,17 @@ fn until(graph: &str, state: &str) -> Value {
     })
 }
 
+/// What was measured at the onset, with names and units.
+fn assert_freeze_frame(frame: &Value) {
+    let has = |what: &str, name: &str, unit: &str| {
+        let all = frame[what].as_array().unwrap();
+        all.iter()
+            .any(|one| one["name"] == name && one["unit"] == unit)
+    };
+    assert!(has("channels", "enc_RM", "rad/s"), "{frame}");
+    assert!(has("command", "cmd_speed", "m/s"), "{frame}");
+}
+
 #[test]
 fn a_fault_lives_from_its_onset_until_it_is_cleared_and_outlives_the_supervisor() {
     let _machine = shared_machine();
@@ -60,13 +71,7 @@ fn a_fault_lives_from_its_onset_until_it_is_cleared_and_outlives_the_supervisor(
     let fault = &named["faults"][0];
     assert_eq!(fault["number"], 1, "the same fault: {named}");
     assert!(fault["evidence"]["nat"].as_f64().unwrap() > 0.0);
-    let channels = fault["freeze_frame"]["channels"].as_array().unwrap();
-    assert!(
-        channels
-            .iter()
-            .any(|one| one["name"] == "enc_RM" && one["unit"] == "rad/s"),
-        "{channels:?}"
-    );
+    assert_freeze_frame(&fault["freeze_frame"]);
     let (code, _, err) = vigil(&name, &["ack", "LM_STUCK"]);
     assert_eq!(
         (code, err.trim()),

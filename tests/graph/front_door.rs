@@ -97,6 +97,16 @@ fn a_graph_that_hears_no_publisher_says_so_and_ends_with_1() {
     );
 }
 
+/// As a launcher does that is killed before it has listed what it has just started.
+fn unlist(graph: &str, service: &str) {
+    let list = Domain::running(graph).unwrap().launcher_file();
+    let lines = std::fs::read_to_string(&list).unwrap();
+    let others = lines.lines().filter(|line| !line.starts_with(service));
+    let others: String = others.map(|line| format!("{line}\n")).collect();
+    assert!(others.len() < lines.len());
+    std::fs::write(list, others).unwrap();
+}
+
 #[test]
 fn a_graph_whose_launcher_was_killed_is_listed_adopted_and_goes_on() {
     let _machine = shared_machine();
@@ -118,15 +128,7 @@ fn a_graph_whose_launcher_was_killed_is_listed_adopted_and_goes_on() {
         err(&refused)
     );
 
-    // A launcher that is killed at a bad moment has not listed what it has just started.
-    let list = Domain::running(&name).unwrap().launcher_file();
-    let lines = std::fs::read_to_string(&list).unwrap();
-    let lines = lines
-        .lines()
-        .filter(|line| !line.starts_with("identifier "));
-    let lines: String = lines.map(|line| format!("{line}\n")).collect();
-    std::fs::write(list, lines).unwrap();
-
+    unlist(&name, "identifier");
     let told = events(&name, "injected").len();
     let launcher = spawn(&["run", "--adopt", "--json", "--graph", &name]);
     let adopted = eventually("it is adopted", || {

@@ -104,10 +104,14 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         let mut archive = Archive::new("top")?;
         archive.say(&format!(
             "`vigil top` beside a graph at {RATE_HZ} Hz, on a terminal of 120 columns and 40 \
-             lines, for {seconds} s: {percent:.2} % of a core; it wrote {} bytes a second. Bar: at most \
-             {PERCENT_MAX} %: {}.",
+             lines, for {seconds} s: {percent:.2} % of a core; it wrote {} bytes a second. Bar: at \
+             most {PERCENT_MAX} %: {}.",
             document["bytes_a_second"],
-            if document["is_met"] == true { "met" } else { "missed" },
+            if document["is_met"] == true {
+                "met"
+            } else {
+                "missed"
+            },
         ));
         archive.store("top.json", &document)?;
         archive.close()?;

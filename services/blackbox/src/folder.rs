@@ -8,8 +8,6 @@ use std::time::{Duration, SystemTime};
 use vigil_flight::{FlightError, Mended};
 use vigil_setup::RunningGraph;
 
-use crate::say::say;
-
 /// How a recording ends that is not finished.
 const PART: &str = ".mcap.part";
 /// How one ends that is being made whole.
@@ -82,16 +80,15 @@ impl RecordingsFolder {
     }
 
     /// Gives those an end that were cut short, so that every program can open them; what is damaged
-    /// stays as it is.
-    pub fn mend_cut(&self) {
+    /// stays as it is. `tell` hears of each.
+    pub fn mend_cut(&self, tell: impl Fn(&Path)) {
         for begun in self.files(MENDING) {
             let _ = fs::remove_file(begun.path);
         }
         let cut = self.files(&format!("{CUT}{WHOLE}"));
         for file in cut.iter().filter(|file| !is_being_written(&file.path)) {
             if let Ok(Mended { damage: None, .. }) = file.mend() {
-                let name = file.path.display();
-                say(&format!("{name} has an end: every program can open it"));
+                tell(&file.path);
             }
         }
     }
@@ -312,10 +309,10 @@ mod tests {
         let file = fs::File::options().write(true).open(&cut).unwrap();
         file.set_modified(old).unwrap();
         file.lock().unwrap();
-        folder.mend_cut();
+        folder.mend_cut(|_| {});
         assert!(!vigil_flight::has_end(&cut).unwrap(), "somebody writes it");
         drop(file);
-        folder.mend_cut();
+        folder.mend_cut(|_| {});
         assert!(vigil_flight::has_end(&cut).unwrap());
         assert_eq!(fs::metadata(&cut).unwrap().modified().unwrap(), old);
         assert_eq!(left(&folder).len(), 1);

@@ -48,7 +48,12 @@ pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     let ring = begin(&material.running);
     let mut rescues = Rescue::start_all(domain);
     // Beside the rest: it may take long, and ends with this process.
-    thread::spawn(move || cut_before.mend_cut());
+    thread::spawn(move || {
+        cut_before.mend_cut(|path| {
+            let name = path.display();
+            say(&format!("{name} has an end: every program can open it"));
+        });
+    });
     let kept = ring.map_err(Into::into);
     let kept = kept.and_then(|ring| keep(&material, ring, miss_ns, &mut rescues));
     if kept.is_ok() {

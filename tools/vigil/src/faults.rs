@@ -19,8 +19,8 @@ const POLL: Duration = Duration::from_millis(50);
 
 /// Lists the faults of a running graph: what failed, since when, and whether somebody knows.
 ///
-/// Exit codes: 0 nothing is left to acknowledge, 1 a fault is active or latched, or nothing is known.
-/// `vigil status` says by its own whether all is well.
+/// Exit codes: 0 nothing is left to acknowledge, 1 a fault is active or latched, or nothing is
+/// known. `vigil status` says by its own whether all is well.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]

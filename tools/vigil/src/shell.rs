@@ -1,5 +1,5 @@
-//! `vigil completions` and `vigil man`: what a shell and `man` read, of the commands of this program
-//! and of those that it starts.
+//! `vigil completions` and `vigil man`: what a shell and `man` read, of the commands of this
+//! program and of those that it starts.
 
 use std::fs::File;
 use std::io;

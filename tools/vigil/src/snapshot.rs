@@ -13,8 +13,9 @@ const POLL: Duration = Duration::from_millis(10);
 
 /// Asks the black box for a recording of the last minute and of what follows.
 ///
-/// It prints the folder in which the recording will lie. `vigil recordings` lists it, and whether it
-/// is still being written. While an alarm is being recorded, the request is noted in that recording.
+/// It prints the folder in which the recording will lie. `vigil recordings` lists it, and whether
+/// it is still being written. While an alarm is being recorded, the request is noted in that
+/// recording.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]

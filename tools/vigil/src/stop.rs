@@ -20,8 +20,8 @@ const POLL: Duration = Duration::from_millis(10);
 /// Stops a running graph; the robot's adapter then holds no valid action, and stops the robot.
 ///
 /// Its launcher stops the services and prints its summary. Without a launcher this command ends the
-/// services itself. No process and no shared memory is left behind. Without --graph it asks first, at
-/// a terminal; elsewhere --graph is needed, so that no script stops a robot by mistake.
+/// services itself. No process and no shared memory is left behind. Without --graph it asks first,
+/// at a terminal; elsewhere --graph is needed, so that no script stops a robot by mistake.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
