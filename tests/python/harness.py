@@ -97,6 +97,12 @@ class Graph:
             time.sleep(0.02)
         return address
 
+    def pid(self, service):
+        """The process of a service."""
+        listed = json.loads(vigil("list", "--json").stdout)["graphs"]
+        services = next(of["services"] for of in listed if of["name"] == self.name)
+        return next(of["pid"] for of in services if of["name"] == service)
+
     def finish(self):
         """Waits for the end; the summary."""
         out, err = self.launcher.communicate(timeout=WATCHDOG_S)

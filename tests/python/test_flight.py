@@ -208,10 +208,7 @@ class BlackBox(unittest.TestCase):
         with Graph("--duration", "60", recordings=self.folder, before_s=30.0) as graph:
             graph.wait_until_up()
             wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
-            listed = json.loads(vigil("list", "--json").stdout)["graphs"]
-            services = next(of["services"] for of in listed if of["name"] == graph.name)
-            detector = next(of["pid"] for of in services if of["name"] == "detector")
-            os.kill(detector, signal.SIGKILL)
+            os.kill(graph.pid("detector"), signal.SIGKILL)
             path, *_ = wait_for(lambda: self.recordings("crash"), "a recording")
             graph.stop()
         flight = Flight(path)

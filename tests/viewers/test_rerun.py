@@ -76,6 +76,11 @@ class Rerun(unittest.TestCase):
         with Graph(*options, recordings=folder.name, **times) as graph:
             found = pathlib.Path(folder.name).glob
             cls.recording, *_ = wait_for(lambda: list(found("*/*-alarm.mcap")), "a recording")
+            cls.recorded = pathlib.Path(cls.home) / "drive.mcap"
+            command = [BINARIES / "vigil", "record", cls.recorded, "--graph", graph.name, "--duration", "3"]
+            subprocess.run(command, check=True, capture_output=True, timeout=WATCHDOG_S)
+            os.kill(graph.pid("detector"), signal.SIGKILL)
+            cls.crash, *_ = wait_for(lambda: list(found("*/*-crash.mcap")), "the recording of a crash")
             graph.stop()
         # It would send statistics of its use.
         cls.rerun("analytics", "disable")
@@ -137,8 +142,9 @@ class Rerun(unittest.TestCase):
             message = next(iter(reader.iter_decoded_messages(topics=[topic]))).decoded_message
         return list(message.name), end_ns
 
-    def test_a_recording_is_decoded(self):
-        self.assert_decoded(self.recording)
+    def test_recordings_of_an_alarm_a_crash_and_a_drive_are_decoded(self):
+        for recording in [self.recording, self.crash, self.recorded]:
+            self.assert_decoded(recording)
 
     def test_a_recording_that_was_cut_and_mended_is_decoded(self):
         cut, mended = (pathlib.Path(self.home) / name for name in ["cut.mcap", "mended.mcap"])

@@ -1,16 +1,16 @@
 //! The graph, and the black box in its states beside it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::error::Error;
 use std::path::Path;
 use std::time::Duration;
 
 use vigil_cycle::{Clock, Monotonic, clock};
 
-use super::half::{Deadlines, Half, Span, State};
+use super::half::{Asked, Deadlines, Half, Span, State};
 use super::process::Process;
 use crate::chain::STAGE_NAMES;
-use crate::latency::attribution::{Record, was_machine_late};
+use crate::latency::attribution::{Record, misses, was_machine_late};
 use crate::latency::canary::{Canary, CanaryRecord};
 use crate::latency::cycles::{Cycle, join};
 use crate::latency::graph::{Change, GraphFile, GraphRun};
@@ -20,8 +20,9 @@ use crate::launched::Launched;
 const SETTLE: Duration = Duration::from_secs(1);
 /// Cycles at the start that are no steady state.
 const WARM_UP: Duration = Duration::from_secs(2);
-/// The machine is late in a cycle if it holds canaries up for longer, ns. Chosen: a quarter of
-/// what a cycle takes; beyond it a cycle says more of the machine than of the black box.
+/// The machine is late in a cycle if it holds canaries up for longer than usual by this, ns.
+/// Chosen: a quarter of what a cycle takes; beyond it a cycle says more of the machine than of the
+/// black box.
 const LATE_NS: u64 = 50_000;
 /// Time around a half, s: to settle, to end a black box, to start another.
 const AROUND_S: f64 = 10.0;
@@ -150,8 +151,17 @@ impl Plan {
         };
         let canaries: Vec<Record<'_>> = canaries.iter().map(Record::from_canary).collect();
         let was_published = |at_ns: u64| frames.get(&at_ns).copied();
-        let was_late = |cycle: &Cycle| was_machine_late(cycle, LATE_NS, &canaries);
-        let half = |span| Half::new(span, &cycles, deadlines, was_published, was_late);
+        let window_ns = deadlines.action_ns;
+        let was_late = |cycle: &Cycle| was_machine_late(cycle, window_ns, LATE_NS, &canaries);
+        let missed = misses(&cycles, deadlines.action_ns, &canaries).into_iter();
+        let of_machine = missed.filter(|miss| miss.is_machine);
+        let of_machine: BTreeSet<u64> = of_machine.map(|miss| miss.t_schedule_ns).collect();
+        let asked = Asked {
+            was_published,
+            was_late,
+            is_of_machine: |at_ns: u64| of_machine.contains(&at_ns),
+        };
+        let half = |span| Half::new(span, &cycles, deadlines, &asked);
         let halves: Vec<Half> = spans.into_iter().map(half).collect();
         match halves.iter().all(|half| half.cycles > 0) {
             true => Ok(Run { halves }),

@@ -78,7 +78,8 @@ pub struct Half {
     pub latency_us: [f64; 2],
     /// The same of all cycles.
     pub latency_of_all_us: [f64; 2],
-    /// Instants past the last deadline although their frame and the machine were in time.
+    /// Instants past the last deadline although their frame was in time, and which are not the
+    /// machine's.
     pub own_misses: u64,
     /// Others past the last deadline.
     pub other_misses: u64,
@@ -93,16 +94,30 @@ pub struct Deadlines {
     pub action_ns: u64,
 }
 
+/// What is asked of each cycle.
+#[derive(Debug, Clone, Copy)]
+pub struct Asked<P, L, M> {
+    /// When the frame of an instant was published, ns.
+    pub was_published: P,
+    /// Whether the machine was late in a cycle.
+    pub was_late: L,
+    /// Whether the miss of an instant is the machine's.
+    pub is_of_machine: M,
+}
+
 impl Half {
-    /// Of the cycles that were due in a span; `cycles` is in order, `was_published` says when the
-    /// frame of an instant was, `was_late` whether the machine was late in a cycle.
-    pub fn new(
+    /// Of the cycles that were due in a span; `cycles` is in order.
+    pub fn new<P, L, M>(
         span: Span,
         cycles: &[Cycle],
         deadlines: Deadlines,
-        was_published: impl Fn(u64) -> Option<u64>,
-        was_late: impl Fn(&Cycle) -> bool,
-    ) -> Self {
+        asked: &Asked<P, L, M>,
+    ) -> Self
+    where
+        P: Fn(u64) -> Option<u64>,
+        L: Fn(&Cycle) -> bool,
+        M: Fn(u64) -> bool,
+    {
         let begin = cycles.partition_point(|cycle| cycle.t_schedule_ns < span.from_ns);
         let end = cycles.partition_point(|cycle| cycle.t_schedule_ns < span.until_ns);
         let own = &cycles[begin..end.max(begin)];
@@ -114,15 +129,18 @@ impl Half {
             [0.5, 0.99].map(|q| quantile(&mut took_us, q))
         };
         let all: Vec<&Cycle> = own.iter().collect();
-        let in_time: Vec<&Cycle> = own.iter().filter(|cycle| !was_late(cycle)).collect();
+        let in_time: Vec<&Cycle> = own
+            .iter()
+            .filter(|cycle| !(asked.was_late)(cycle))
+            .collect();
         let missed = own
             .iter()
             .filter(|cycle| cycle.end_to_end_ns() > deadlines.action_ns);
         let is_own = |cycle: &&Cycle| {
-            let published_ns = was_published(cycle.t_schedule_ns);
+            let published_ns = (asked.was_published)(cycle.t_schedule_ns);
             let is_frame_in_time =
                 published_ns.is_some_and(|at_ns| at_ns <= cycle.t_schedule_ns + deadlines.frame_ns);
-            is_frame_in_time && !was_late(cycle)
+            is_frame_in_time && !(asked.is_of_machine)(cycle.t_schedule_ns)
         };
         let missed: Vec<&Cycle> = missed.collect();
         let own_misses = missed.iter().copied().filter(is_own).count() as u64;
@@ -213,19 +231,33 @@ mod tests {
             action_ns: 500,
         };
         let late = |at_ns| Some(at_ns + if at_ns == 3000 { 400 } else { 10 });
-        let half = Half::new(span, &cycles, deadlines, late, |_| false);
+        let asked = Asked {
+            was_published: late,
+            was_late: |_: &Cycle| false,
+            is_of_machine: |_| false,
+        };
+        let half = Half::new(span, &cycles, deadlines, &asked);
         assert_eq!((half.cycles, half.own_misses, half.other_misses), (3, 1, 1));
         assert_eq!(half.latency_us[0], 0.6);
         assert_eq!(
             (half.latency_of_all_us, half.machine_late),
             (half.latency_us, 0)
         );
-        let was_late = |cycle: &Cycle| cycle.t_schedule_ns == 2000;
-        let half = Half::new(span, &cycles, deadlines, late, was_late);
+        let asked = Asked {
+            was_published: late,
+            was_late: |cycle: &Cycle| cycle.t_schedule_ns == 2000,
+            is_of_machine: |at_ns| at_ns == 2000,
+        };
+        let half = Half::new(span, &cycles, deadlines, &asked);
         assert_eq!((half.cycles, half.own_misses, half.other_misses), (3, 0, 2));
-        assert_eq!((half.machine_late, half.latency_of_all_us[0]), (1, 0.6));
-        assert!(half.latency_us[0] < 0.6);
-        let never = Half::new(span, &cycles, deadlines, |_| None, |_| false);
+        assert_eq!(half.machine_late, 1);
+        assert_eq!((half.latency_us[1], half.latency_of_all_us[1]), (0.6, 0.7));
+        let asked = Asked {
+            was_published: |_| None,
+            was_late: |_: &Cycle| false,
+            is_of_machine: |_| false,
+        };
+        let never = Half::new(span, &cycles, deadlines, &asked);
         assert_eq!((never.own_misses, never.other_misses), (0, 2));
     }
 }

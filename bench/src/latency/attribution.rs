@@ -92,10 +92,17 @@ fn covered_ns(mut stretches: Vec<[u64; 2]>) -> u64 {
     covered_ns
 }
 
-/// True if between a cycle's schedule and its end canaries were overdue for longer than this, ns.
+/// True if canaries were overdue for longer than `longest_ns` in the time from a cycle's schedule
+/// until `window_ns` later. That window is the same for a fast cycle and a slow one: neither is
+/// likelier to be left out.
 #[must_use]
-pub fn was_machine_late(cycle: &Cycle, longest_ns: u64, canaries: &[Record<'_>]) -> bool {
-    let (from_ns, to_ns) = (cycle.t_schedule_ns, cycle.t_done_ns);
+pub fn was_machine_late(
+    cycle: &Cycle,
+    window_ns: u64,
+    longest_ns: u64,
+    canaries: &[Record<'_>],
+) -> bool {
+    let (from_ns, to_ns) = (cycle.t_schedule_ns, cycle.t_schedule_ns + window_ns);
     let overdue = canaries.iter().flat_map(|c| c.overdue(from_ns, to_ns));
     covered_ns(overdue.collect()) > longest_ns
 }

@@ -61,9 +61,12 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
          from round to round. From the schedule to the action, by the services' own stamps: the \
          median over the rounds, and the geometric mean of the ratios within rounds. Brackets: \
          95 %, by a bootstrap over the rounds. A canary on each core, above the services, says in \
-         which cycles the machine was late by more than 50 us: percentiles are of the others; \
-         all: of all cycles. Own: past the deadline, although frame and machine were in time; \
-         more than off: the differences within rounds. The first second after an \
+         which cycles the machine held it up for more than 50 us beyond what is usual: \
+         percentiles are of the others; all: of all cycles. What holds canaries up, too, as the \
+         kernel's own work does, is seen only there, and in the share of cycles in which the \
+         machine was late. Own: past the deadline, although the frame was in time, and the \
+         machine was late for less than half of that; more than off: the differences within \
+         rounds. The first second after an \
          orderly start or end of the black box is left out; what \
          follows a signal counts from its instant.\n",
         args.rate

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use vigil_flight::{FlightError, Mended};
+use vigil_flight::FlightError;
 use vigil_setup::RunningGraph;
 
 /// How a recording ends that is not finished.
@@ -17,6 +17,8 @@ const WHOLE: &str = ".mcap";
 /// How the name of one ends that was cut short, and of one that nothing but missed cycles is the
 /// reason of.
 const CUT: &str = "-cut";
+/// How the name of one ends of which a part is not what was written.
+const DAMAGED: &str = "-damaged";
 const MISS: &str = "-miss";
 
 /// A graph's folder of recordings, of bounded size. Other files in it are nobody's business here.
@@ -79,16 +81,20 @@ impl RecordingsFolder {
         left.filter_map(|part| adopt(&part.path)).collect()
     }
 
-    /// Gives those an end that were cut short, so that every program can open them; what is damaged
-    /// stays as it is. `tell` hears of each.
+    /// Gives those an end that were cut short, so that every program can open them. What is damaged
+    /// stays as it is, under another name. `tell` hears of each.
     pub fn mend_cut(&self, tell: impl Fn(&Path)) {
         for begun in self.files(MENDING) {
             let _ = fs::remove_file(begun.path);
         }
-        let cut = self.files(&format!("{CUT}{WHOLE}"));
-        for file in cut.iter().filter(|file| !is_being_written(&file.path)) {
-            if let Ok(Mended { damage: None, .. }) = file.mend() {
-                tell(&file.path);
+        for file in self.files(&format!("{CUT}{WHOLE}")) {
+            let is_whole = vigil_flight::has_end(&file.path).unwrap_or(true);
+            if is_whole || is_being_written(&file.path) {
+                continue;
+            }
+            self.prune(file.bytes);
+            if let Ok(path) = file.mend() {
+                tell(&path);
             }
         }
     }
@@ -175,29 +181,39 @@ struct RecordingFile {
 }
 
 impl RecordingFile {
-    /// Makes it whole; it is as old as it was.
-    fn mend(&self) -> Result<Mended, FlightError> {
+    /// Makes it whole, or renames it if it is damaged; it is as old as it was.
+    fn mend(&self) -> Result<PathBuf, FlightError> {
         let begun = self.path.with_extension("mcap.mending");
         let mended = vigil_flight::mend(&self.path, &begun)?;
+        let unwritten = |source| FlightError::File {
+            path: self.path.clone(),
+            source,
+        };
         if mended.damage.is_some() {
             let _ = fs::remove_file(begun);
-            return Ok(mended);
+            let name = self.path.to_string_lossy();
+            let name = name.strip_suffix(&format!("{CUT}{WHOLE}")).unwrap_or(&name);
+            let damaged = PathBuf::from(format!("{name}{DAMAGED}{WHOLE}"));
+            fs::rename(&self.path, &damaged).map_err(unwritten)?;
+            return Ok(damaged);
         }
         let replaced = File::open(&begun)
             .and_then(|file| file.set_modified(self.modified))
-            .and_then(|()| fs::rename(&begun, &self.path));
-        replaced
-            .map(|()| mended)
-            .map_err(|source| FlightError::File {
-                path: self.path.clone(),
-                source,
-            })
+            // It may have had to make room meanwhile.
+            .and_then(|()| fs::metadata(&self.path))
+            .and_then(|_| fs::rename(&begun, &self.path));
+        if replaced.is_err() {
+            let _ = fs::remove_file(begun);
+        }
+        replaced.map_err(unwritten)?;
+        Ok(self.path.clone())
     }
 
     fn is_of_misses(&self) -> bool {
         let name = self.path.file_stem().unwrap_or_default();
         let name = name.to_string_lossy();
-        name.strip_suffix(CUT).unwrap_or(&name).ends_with(MISS)
+        let name = name.strip_suffix(CUT).unwrap_or(&name);
+        name.strip_suffix(DAMAGED).unwrap_or(name).ends_with(MISS)
     }
 }
 
@@ -316,6 +332,16 @@ mod tests {
         assert!(vigil_flight::has_end(&cut).unwrap());
         assert_eq!(fs::metadata(&cut).unwrap().modified().unwrap(), old);
         assert_eq!(left(&folder).len(), 1);
+        // Of a damaged one nothing is thrown away.
+        let mut damaged = content[..content.len() / 2].to_vec();
+        damaged.extend_from_slice(&[0xff; 64]);
+        fs::write(&cut, &damaged).unwrap();
+        folder.mend_cut(|_| {});
+        let [kept] = &left(&folder)[..] else {
+            panic!("{:?}", left(&folder));
+        };
+        assert!(kept.ends_with("-alarm-damaged.mcap"), "{kept}");
+        assert_eq!(fs::read(folder.path().join(kept)).unwrap(), damaged);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread;
+use std::time::Duration;
 
 use vigil_cycle::port::Link;
 use vigil_cycle::{Clock, Domain, Graph, Monotonic, signal};
@@ -20,6 +21,8 @@ use crate::rescue::{self, Rescue};
 use crate::ring::RingWriter;
 use crate::say::{say, tell};
 
+/// What was cut short is mended so long after the start, which has enough to do.
+const MEND_AFTER: Duration = Duration::from_secs(10);
 /// Nanoseconds of a second.
 const NS: f64 = 1e9;
 /// A recording is at most so many times as long after its first cause as after its last.
@@ -49,9 +52,12 @@ pub fn run(running: RunningGraph) -> Result<(), Box<dyn Error>> {
     let mut rescues = Rescue::start_all(domain);
     // Beside the rest: it may take long, and ends with this process.
     thread::spawn(move || {
+        thread::sleep(MEND_AFTER);
         cut_before.mend_cut(|path| {
-            let name = path.display();
-            say(&format!("{name} has an end: every program can open it"));
+            say(&format!(
+                "{} has an end, or a name that says why not",
+                path.display()
+            ));
         });
     });
     let kept = ring.map_err(Into::into);

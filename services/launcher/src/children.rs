@@ -22,11 +22,13 @@ const STOP_LIMIT: Duration = Duration::from_secs(3);
 /// Time that a killed one may take to be gone.
 const KILL_LIMIT: Duration = Duration::from_secs(1);
 
-/// True of the command line of this service or black box, but for one that only rescues.
+/// True of the command line of this service or black box, but for one that only rescues or records
+/// for somebody.
 fn is_service(words: &[String], name: &str) -> bool {
     let program = words.first().and_then(|word| Path::new(word).file_name());
     let is_it = program.is_some_and(|program| program == format!("vigil-{name}").as_str());
-    is_it && !words.iter().any(|word| word == "--rescue")
+    let has_other_work = |word: &String| ["--rescue", "--record"].contains(&word.as_str());
+    is_it && !words.iter().any(has_other_work)
 }
 
 /// One service process.

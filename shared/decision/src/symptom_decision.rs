@@ -362,7 +362,11 @@ impl DecisionRule for SymptomDecision {
             self.take_over(0.0);
             // What is not heard of yet calls nobody.
             self.latch.keep_open(true);
+            let before = self.process.choice.action;
             self.choose();
+            if self.process.choice.action != before {
+                self.open_decision();
+            }
         }
     }
 

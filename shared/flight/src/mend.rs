@@ -58,10 +58,6 @@ pub fn mend(from: &Path, to: &Path) -> Result<Mended, FlightError> {
     };
     // Refuses other programs' files.
     drop(FlightReader::open(from)?);
-    if has_end(from).map_err(unreadable)? {
-        let path = from.to_owned();
-        return Err(FlightError::Whole { path });
-    }
     let source = BufReader::new(File::open(from).map_err(unreadable)?);
     let file = File::create(to).map_err(unwritten)?;
     let copied = copy(source, &file).map_err(|error| match error {
@@ -72,12 +68,15 @@ pub fn mend(from: &Path, to: &Path) -> Result<Mended, FlightError> {
             source,
         },
     });
-    let mended = copied.and_then(|mended| match mended.messages {
-        0 => Err(FlightError::Damaged {
+    let mended = copied.and_then(|copied| match copied {
+        None => Err(FlightError::Whole {
+            path: from.to_owned(),
+        }),
+        Some(Mended { messages: 0, .. }) => Err(FlightError::Damaged {
             path: from.to_owned(),
             what: "nothing in it is whole".to_owned(),
         }),
-        _ => file.sync_all().map_err(unwritten).map(|()| mended),
+        Some(mended) => file.sync_all().map_err(unwritten).map(|()| mended),
     });
     if mended.is_err() {
         let _ = fs::remove_file(to);
@@ -91,8 +90,8 @@ enum CopyError {
     Write(McapError),
 }
 
-/// Copies records until one is not whole or not sound.
-fn copy(mut source: impl Read, file: &File) -> Result<Mended, CopyError> {
+/// Copies records until one is not whole or not sound; `None` if all were, and the end was there.
+fn copy(mut source: impl Read, file: &File) -> Result<Option<Mended>, CopyError> {
     let chunks = options().chunk_size(Some(CHUNK_BYTES));
     let stream = NoSeek::new(BufWriter::new(file));
     let mut copy = chunks.create(stream).map_err(CopyError::Write)?;
@@ -101,8 +100,9 @@ fn copy(mut source: impl Read, file: &File) -> Result<Mended, CopyError> {
     let mut messages = 0;
     let damage = loop {
         match records.next_event() {
-            // The reader wants an end, and there is none.
-            None | Some(Err(McapError::UnexpectedEof)) => break None,
+            None => return Ok(None),
+            // There is no end.
+            Some(Err(McapError::UnexpectedEof)) => break None,
             Some(Err(error)) => break Some(error.to_string()),
             Some(Ok(LinearReadEvent::ReadRequest(bytes))) => {
                 match source.read(records.insert(bytes)) {
@@ -129,7 +129,7 @@ fn copy(mut source: impl Read, file: &File) -> Result<Mended, CopyError> {
     })
     .map_err(CopyError::Write)?;
     copy.finish().map_err(CopyError::Write)?;
-    Ok(Mended { messages, damage })
+    Ok(Some(Mended { messages, damage }))
 }
 
 /// Adds a record; the copy has an index, numbers and an end of its own.

@@ -10,7 +10,7 @@ use bytemuck::bytes_of;
 use proptest::prelude::*;
 use vigil_blocks::{Block, DetectionBelief, Header, Health, SensorFrame};
 use vigil_cycle::topic::{ServiceName, Topic};
-use vigil_flight::{FlightError, FlightReader, FlightWriter, Recorded, mend, read_block};
+use vigil_flight::{FlightError, FlightReader, FlightWriter, Recorded, has_end, mend, read_block};
 use vigil_timeline::{TimelineEntry, WallClock};
 
 const MS: u64 = 1_000_000;
@@ -191,6 +191,32 @@ fn other_files_are_refused_by_name() {
     let missing = FlightReader::open(Path::new("/missing.mcap")).map(|_| ());
     let text = missing.unwrap_err().to_string();
     assert!(text.starts_with("cannot read /missing.mcap: "), "{text}");
+}
+
+#[test]
+fn of_a_damaged_file_with_an_end_what_comes_before_the_damage_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, whole] = ["a.mcap", "b.mcap"].map(|name| folder.path().join(name));
+    let told = write(&path);
+    let mut content = fs::read(&path).unwrap();
+    let is_last = |at: &usize| content[*at..].starts_with(bytes_of(&5.0_f64));
+    let at = (0..content.len()).rev().find(is_last).unwrap();
+    content[at] ^= 1;
+    fs::write(&path, &content).unwrap();
+    assert!(has_end(&path).unwrap());
+    let mended = mend(&path, &whole).unwrap();
+    assert!(mended.damage.is_some() && mended.messages > 0);
+    let found = read(&mut FlightReader::open(&whole).unwrap()).unwrap();
+    assert!(!found.is_empty() && found.len() < told.len());
+    assert_eq!(found[..], told[..found.len()]);
+    // A loss of power may leave zeros.
+    let cut = folder.path().join("c.mcap");
+    content.truncate(at);
+    content.resize(at + 4096, 0);
+    fs::write(&cut, &content).unwrap();
+    mend(&cut, &whole).unwrap();
+    let after = read(&mut FlightReader::open(&whole).unwrap()).unwrap();
+    assert_eq!(after, found);
 }
 
 #[test]

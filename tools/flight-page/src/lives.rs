@@ -134,13 +134,18 @@ impl Lives {
         let alarm_s = alarm.filter(|from_s| t_s - from_s <= ALARM_BEFORE_S);
         for record in faults.kept().filter(is_there) {
             let is_of_robot = record.source == FaultSource::Robot as u32;
-            let seen_s = match record.state() {
-                // Told of before the recording began, or before this block.
-                Some(FaultState::Active) if record.changed_ns > 0 => {
-                    let now_ns = faults.header.t_publish_ns;
-                    t_s - now_ns.saturating_sub(record.changed_ns) as f64 * 1e-9
-                }
-                _ => t_s,
+            // Told of before the recording began, or before this block. The only time of one that
+            // was acknowledged may be long ago; of others, when it was is not known.
+            let then_ns = match record.state() {
+                Some(FaultState::Active) => record.changed_ns,
+                Some(FaultState::Acknowledged) if record.count == 1 => record.first_ns,
+                Some(FaultState::Acknowledged) => record.changed_ns,
+                _ => 0,
+            };
+            let age_ns = faults.header.t_publish_ns.saturating_sub(then_ns);
+            let seen_s = match then_ns {
+                0 => t_s,
+                _ => t_s - age_ns as f64 * 1e-9,
             };
             let began_s = alarm_s
                 .filter(|_| is_of_robot)
@@ -264,5 +269,98 @@ impl FaultLife {
         let spans = self.states.all().iter();
         let present = spans.filter(|span| is_present(span.value));
         present.map(|span| [span.from_s, span.to_s]).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use vigil_blocks::Header;
+
+    use super::*;
+
+    const NS: f64 = 1e9;
+    /// When the recording began, by the graph's clock, s.
+    const BEGAN_S: f64 = 5000.0;
+
+    /// One fault at `t_s` of the recording, in this state since `since_s`.
+    fn faults(t_s: f64, what: u32, state: FaultState, since_s: f64, count: u32) -> Faults {
+        let at_ns = |t_s: f64| ((BEGAN_S + t_s) * NS) as u64;
+        let mut faults = Faults {
+            header: Header {
+                t_publish_ns: at_ns(t_s),
+                ..Header::default()
+            },
+            ..Faults::default()
+        };
+        faults.records[0] = FaultRecord {
+            number: 1,
+            source: FaultSource::Robot as u32,
+            what,
+            state: state as u32,
+            first_ns: at_ns(since_s),
+            changed_ns: at_ns(since_s),
+            count,
+            // Of a publisher with a clock of its own.
+            frame_t_capture_ns: 7,
+            ..FaultRecord::default()
+        };
+        faults
+    }
+
+    fn since_s(blocks: &[(f64, Faults)], alarm_s: Option<f64>) -> f64 {
+        let mut lives = Lives::default();
+        let setup = vigil_setup::load_graph(
+            std::path::Path::new(concat!(
+                env!("CARGO_MANIFEST_DIR"),
+                "/../../config/rover.toml"
+            )),
+            |_| {},
+        );
+        let setup = setup.unwrap();
+        for (t_s, faults) in blocks {
+            let action = Action {
+                alarm: u32::from(alarm_s.is_some_and(|alarm_s| *t_s >= alarm_s)),
+                ..Action::default()
+            };
+            lives.take_action(*t_s, &action, &setup);
+            lives.take_faults(*t_s, faults, &setup);
+        }
+        let told = lives.faults();
+        told.iter()
+            .filter_map(|life| life.since_s)
+            .reduce(f64::min)
+            .unwrap()
+    }
+
+    #[test]
+    fn a_fault_began_when_it_was_seen_first_or_with_the_alarm_just_before() {
+        use FaultState::{Active, Pending};
+        let blocks = |from_s: f64| {
+            let pending = faults(from_s, MODE_UNKNOWN, Pending, from_s, 0);
+            let named = faults(from_s + 0.5, 1, Active, from_s + 0.5, 1);
+            [(from_s, pending), (from_s + 0.5, named)]
+        };
+        assert_eq!(since_s(&blocks(10.0), None), 10.0);
+        assert_eq!(since_s(&blocks(10.0), Some(10.0)), 10.0);
+        // A pending one that was gone is another matter.
+        let [first, _] = blocks(3.0);
+        let [second, third] = blocks(40.0);
+        let gone = (5.0, Faults::default());
+        let all = [first, gone, second, third];
+        assert_eq!(since_s(&all, None), 40.0);
+    }
+
+    #[test]
+    fn one_that_was_told_before_the_recording_began_then() {
+        use FaultState::{Acknowledged, Active};
+        let near = |found: f64, wanted: f64| assert!((found - wanted).abs() < 1e-3, "{found}");
+        near(
+            since_s(&[(0.0, faults(0.0, 1, Active, -30.0, 3))], None),
+            -30.0,
+        );
+        near(
+            since_s(&[(0.0, faults(0.0, 1, Acknowledged, -60.0, 1))], None),
+            -60.0,
+        );
     }
 }

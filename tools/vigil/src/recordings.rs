@@ -1,6 +1,6 @@
 //! `vigil recordings`: what the black box of a graph has written.
 
-use std::fs;
+use std::fs::{self, TryLockError};
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
@@ -62,7 +62,6 @@ struct ListedRecording {
 /// # Errors
 /// A graph that runs without a black box; one that does not run, and of which there is no folder.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let mut is_running = true;
     let (graph, folder) = match args.running.find() {
         Ok(running) => {
             let graph = running.domain.graph().to_owned();
@@ -71,15 +70,12 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             })?;
             (graph, PathBuf::from(folder))
         }
-        Err(why @ (NotRunning::None | NotRunning::Unknown { .. })) => {
-            is_running = false;
-            find(args, &why)?
-        }
+        Err(why @ (NotRunning::None | NotRunning::Unknown { .. })) => find(args, &why)?,
         Err(error) => return Err(CommandError::failure(error)),
     };
     let document = Document {
         schema_version: 1,
-        recordings: listed(&folder, &graph, is_running),
+        recordings: listed(&folder, &graph),
         graph,
         folder: folder.display().to_string(),
     };
@@ -100,7 +96,7 @@ fn find(args: &Args, why: &NotRunning) -> Result<(String, PathBuf), CommandError
     let graph = graph.unwrap_or(&setup.file.graph.name).clone();
     let candidates = setup.file.blackbox.folders(&setup.path, &graph);
     let mut there = candidates.iter().filter(|folder| folder.is_dir());
-    let has_any = |folder: &&PathBuf| !listed(folder, &graph, false).is_empty();
+    let has_any = |folder: &&PathBuf| !listed(folder, &graph).is_empty();
     let with_any = there.clone().find(has_any);
     let found = with_any.or_else(|| there.next()).cloned();
     let found = found.ok_or_else(|| {
@@ -116,7 +112,13 @@ fn find(args: &Args, why: &NotRunning) -> Result<(String, PathBuf), CommandError
     Ok((graph, found))
 }
 
-fn listed(folder: &Path, graph: &str, is_running: bool) -> Vec<ListedRecording> {
+/// True while somebody writes the file: its writer holds a lock.
+fn is_locked(path: &Path) -> bool {
+    let file = fs::File::open(path);
+    file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+}
+
+fn listed(folder: &Path, graph: &str) -> Vec<ListedRecording> {
     let begin = format!("{graph}-");
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let recordings = entries.filter_map(|entry| {
@@ -131,7 +133,7 @@ fn listed(folder: &Path, graph: &str, is_running: bool) -> Vec<ListedRecording> 
             name,
             bytes: metadata.len(),
             written_unix_s: written.as_secs_f64(),
-            is_being_written: is_part && is_running,
+            is_being_written: is_part && is_locked(&entry.path()),
         })
     });
     let mut recordings: Vec<ListedRecording> = recordings.collect();
@@ -173,7 +175,13 @@ mod tests {
             fs::write(folder.path().join(name), [0; 1 << 20]).unwrap();
             std::thread::sleep(std::time::Duration::from_millis(10));
         }
-        let recordings = listed(folder.path(), "rover", true);
+        let begun = fs::File::open(folder.path().join("rover-2-crash.mcap.part")).unwrap();
+        assert!(
+            !listed(folder.path(), "rover")[1].is_being_written,
+            "it was left"
+        );
+        begun.lock().unwrap();
+        let recordings = listed(folder.path(), "rover");
         let names: Vec<_> = recordings.iter().map(|it| it.name.as_str()).collect();
         assert_eq!(names, ["rover-1-alarm.mcap", "rover-2-crash.mcap.part"]);
         let document = Document {

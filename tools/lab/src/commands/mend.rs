@@ -8,7 +8,7 @@ use vigil_terminal::{CommandError, Outcome};
 ///
 /// The black box does so at its start with what a loss of power has left. This command does it for
 /// a file of `vigil record` that was killed, FILE.mcap.part, and for one that is damaged: what
-/// comes before the damage is kept.
+/// comes before the damage is kept. Exit codes: 0 done, 1 done up to a damage, or nothing to mend.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The recording that was cut short.
@@ -30,8 +30,11 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     }
     let mended = vigil_flight::mend(&args.recording, &args.out).map_err(CommandError::failure)?;
     eprintln!("wrote {}: {} messages", args.out.display(), mended.messages);
-    if let Some(damage) = mended.damage {
-        eprintln!("what follows is lost: {damage}");
-    }
-    Ok(Outcome::Done)
+    Ok(match mended.damage {
+        None => Outcome::Done,
+        Some(damage) => {
+            eprintln!("what follows is lost: {damage}");
+            Outcome::Failed
+        }
+    })
 }
