@@ -251,7 +251,8 @@ mod tests {
         let half = Half::new(span, &cycles, deadlines, &asked);
         assert_eq!((half.cycles, half.own_misses, half.other_misses), (3, 0, 2));
         assert_eq!(half.machine_late, 1);
-        assert_eq!((half.latency_us[1], half.latency_of_all_us[1]), (0.6, 0.7));
+        let p99_us = [half.latency_us[1], half.latency_of_all_us[1]];
+        assert!((p99_us[0] - 0.6).abs() < 1e-9 && (p99_us[1] - 0.7).abs() < 1e-9);
         let asked = Asked {
             was_published: |_| None,
             was_late: |_: &Cycle| false,

@@ -307,11 +307,13 @@ mod tests {
         let mut writer = FlightWriter::create(&whole, &graph, WallClock::ahead_by(0)).unwrap();
         assert!(is_being_written(&part_path(&whole)));
         assert!(folder.adopt_parts().is_empty());
-        for second in 1..4 {
+        let marked = |second: u64| 1234.5 * second as f64;
+        for second in 1..6 {
             let t_ns = second * 1_000_000_000;
             let mut frame = SensorFrame::default();
             frame.header.schema = SensorFrame::SCHEMA;
             frame.header.t_publish_ns = t_ns;
+            frame.set_command(0, marked(second));
             writer
                 .block(Topic::Sensor, bytemuck::bytes_of(&frame))
                 .unwrap();
@@ -333,8 +335,10 @@ mod tests {
         assert_eq!(fs::metadata(&cut).unwrap().modified().unwrap(), old);
         assert_eq!(left(&folder).len(), 1);
         // Of a damaged one nothing is thrown away.
-        let mut damaged = content[..content.len() / 2].to_vec();
-        damaged.extend_from_slice(&[0xff; 64]);
+        let mut damaged = content[..content.len() - 100].to_vec();
+        let last = marked(5).to_le_bytes();
+        let at = damaged.windows(8).position(|bytes| bytes == last).unwrap();
+        damaged[at] ^= 1;
         fs::write(&cut, &damaged).unwrap();
         folder.mend_cut(|_| {});
         let [kept] = &left(&folder)[..] else {
