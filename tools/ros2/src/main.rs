@@ -47,7 +47,11 @@ struct Args {
 
 fn main() -> ExitCode {
     if let Some(printed) = CommandTree::answer(Args::command()) {
-        return exit_code(printed.map(|()| Outcome::Done).map_err(CommandError::failure));
+        return exit_code(
+            printed
+                .map(|()| Outcome::Done)
+                .map_err(CommandError::failure),
+        );
     }
     exit_code(run(&Args::parse()))
 }
