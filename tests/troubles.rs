@@ -5,7 +5,13 @@
 mod watched;
 
 use vigil_blocks::{MODE_UNKNOWN, SensorFrame};
+use vigil_robot::{Fault, FaultKind};
 use watched::WatchedRover;
+
+const STUCK: Fault = Fault {
+    kind: FaultKind::Stuck,
+    wheel: 4,
+};
 
 /// True once the alarm stands and the diagnosis is unknown.
 fn is_noticed(watched: &WatchedRover) -> bool {
@@ -49,18 +55,35 @@ fn a_robot_that_drives_on_though_it_should_stand_is_noticed() {
 }
 
 #[test]
+fn watchers_that_begin_beside_a_stuck_wheel_name_nothing_else() {
+    for (seed, lead) in (41..).zip([0, 1, 5, 10, 20, 50, 140]) {
+        let mut watched = WatchedRover::new(seed);
+        watched.drive(3.0);
+        watched.world.inject(STUCK).unwrap();
+        watched.drive(4.0);
+        watched.replace_watchers(lead);
+        let leaf = watched.leaf(STUCK) as u32;
+        for cycle in 0..400 {
+            watched.step();
+            let mode = watched.diagnosis.mode;
+            assert!(
+                [0, leaf].contains(&mode),
+                "{lead} cycles before, {cycle} after: {mode}"
+            );
+        }
+        assert_eq!(watched.diagnosis.mode, leaf, "{lead}");
+    }
+}
+
+#[test]
 fn a_clock_that_is_set_back_stops_nobody() {
     let mut watched = WatchedRover::new(33);
     watched.drive(8.0);
     watched.frame_time_back(5.0);
     watched.drive(3.0);
     assert!(is_well(&watched));
-    let fault = vigil_robot::Fault {
-        kind: vigil_robot::FaultKind::Stuck,
-        wheel: 4,
-    };
-    watched.world.inject(fault).unwrap();
+    watched.world.inject(STUCK).unwrap();
     // Well before the clock is where it was.
     watched.drive(1.0);
-    assert_eq!(watched.diagnosis.mode, watched.leaf(fault) as u32);
+    assert_eq!(watched.diagnosis.mode, watched.leaf(STUCK) as u32);
 }

@@ -101,6 +101,8 @@ fn replaced_beside_a_stuck_wheel(config: PathBuf, name: &str, deaths: &[&[&str]]
     let observed = graph.observe();
     let mut health = HealthWatch::new(&observed);
     let mut actions = observed.receiver::<Action>(Topic::Action).unwrap();
+    // Told if the test fails.
+    let mut last = None;
     // The robot drives: a detector that was replaced arms, and raises its own alarm.
     let mut compensates = |for_ns: u64| {
         let mut since_ns = None;
@@ -108,6 +110,10 @@ fn replaced_beside_a_stuck_wheel(config: PathBuf, name: &str, deaths: &[&[&str]]
             let mut is_done = None;
             drain(actions.as_mut(), |action| {
                 let now_ns = action.header.t_publish_ns;
+                let kind = RecoveryKind::from_repr(action.kind);
+                if last.replace(kind) != Some(kind) {
+                    println!("{:.2} s: {kind:?}", now_ns as f64 * 1e-9);
+                }
                 let is_compensated = action.kind == RecoveryKind::Compensate as u32;
                 since_ns = is_compensated.then(|| since_ns.unwrap_or(now_ns));
                 let passed_ns = since_ns.map_or(0, |since_ns| now_ns - since_ns);
@@ -118,6 +124,7 @@ fn replaced_beside_a_stuck_wheel(config: PathBuf, name: &str, deaths: &[&[&str]]
     };
     compensates(500_000_000);
     for services in deaths {
+        println!("{services:?} die");
         replace(&mut health, services);
         compensates(4_000_000_000);
     }
@@ -237,4 +244,45 @@ fn a_restarted_service_runs_on_what_the_launcher_has_read() {
     graph.interrupt();
     graph.finish();
     let _ = std::fs::remove_dir_all(folder);
+}
+
+#[test]
+fn a_rover_with_a_stuck_wheel_reaches_its_goal_while_services_are_replaced() {
+    let _machine = machine();
+    let options = ["--duration", "110", "--inject", "stuck:RM@5"];
+    let config = "config/corridor-people.toml".into();
+    let mut graph = RunningGraph::start_with(config, "corridor", &options);
+    let observed = graph.observe();
+    let mut health = HealthWatch::new(&observed);
+    let mut actions = observed.receiver::<Action>(Topic::Action).unwrap();
+    let mut compensates = || {
+        eventually("the stuck wheel is compensated", || {
+            let mut is_done = None;
+            drain(actions.as_mut(), |action| {
+                let is_compensated = action.kind == RecoveryKind::Compensate as u32;
+                is_done = is_compensated.then_some(());
+            });
+            is_done
+        });
+    };
+    for services in [&["supervisor"][..], &["detector"], &["identifier"]] {
+        compensates();
+        replace(&mut health, services);
+    }
+    let summary = graph.finish();
+    assert_eq!(summary.events("goal").len(), 1);
+    // From the first counter-steering (CP) on nobody calls a person (SH), or follows the path as if
+    // all wheels turned (FP).
+    let since = decided_since(&summary);
+    let first = since.iter().position(|what| what == "CP");
+    let after = first.map_or(&[][..], |first| &since[first..]);
+    let is_wrong = |what: &String| ["SH", "FP"].contains(&what.as_str());
+    assert!(
+        !after.is_empty() && !after.iter().any(is_wrong),
+        "{since:?}"
+    );
+    assert!(summary.events("latched").is_empty(), "{since:?}");
+    let told = summary.events("fault").into_iter().map(|event| event.1);
+    let told: Vec<String> = told.filter(|what| what.contains("STUCK")).collect();
+    assert_eq!(told, ["RM_STUCK is active"]);
 }

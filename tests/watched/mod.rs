@@ -60,22 +60,37 @@ impl WatchedRover {
         self.step_with(|_| ());
     }
 
+    /// Other processes take over from both watchers; the detector begins so many cycles before the
+    /// identifier.
+    pub fn replace_watchers(&mut self, lead: usize) {
+        self.detector = vigil_detector::assemble(&self.setup).unwrap();
+        for _ in 0..lead {
+            self.detect(|_| ());
+        }
+        self.identifier = vigil_identifier::assemble(&self.setup).unwrap();
+    }
+
     /// One cycle whose frame is changed before anyone takes it.
     pub fn step_with(&mut self, change: impl Fn(&mut SensorFrame)) {
-        let command = EffectiveCommand::as_planned(self.world.planned());
-        self.world.step(1.0 / RATE_HZ, command);
-        self.world.measure(&mut self.frame);
-        self.frame.header.t_capture_ns += PERIOD_NS;
-        change(&mut self.frame);
+        self.detect(change);
         let [detected, drawn] = &mut self.particles;
-        let entry = Entry::Frame(&self.frame);
-        self.detector.step(entry, &mut self.detection, detected);
         let input = Input {
             frame: &self.frame,
             detection: Some((&*self.detection, &**detected)),
         };
         let entry = Entry::Frame(input);
         self.identifier.step(entry, &mut self.diagnosis, drawn);
+    }
+
+    fn detect(&mut self, change: impl Fn(&mut SensorFrame)) {
+        let command = EffectiveCommand::as_planned(self.world.planned());
+        self.world.step(1.0 / RATE_HZ, command);
+        self.world.measure(&mut self.frame);
+        self.frame.header.t_capture_ns += PERIOD_NS;
+        change(&mut self.frame);
+        let entry = Entry::Frame(&self.frame);
+        let [detected, _] = &mut self.particles;
+        self.detector.step(entry, &mut self.detection, detected);
     }
 
     pub fn drive(&mut self, seconds: f64) {

@@ -13,6 +13,7 @@ use vigil_blocks::{Action, Block, SensorFrame};
 
 use crate::clock::{Clock, Monotonic};
 use crate::port_error::PortError;
+use crate::runtime_folder::{excess_bytes, runtime_folder};
 use crate::topic::{ServiceName, Topic};
 
 /// Version of the transport, as the workspace's manifest demands it.
@@ -68,21 +69,37 @@ impl Domain {
     /// The place of `graph`; creates its runtime folder (mode 0700).
     ///
     /// # Errors
-    /// [`PortError::Setup`] when no runtime folder can be made.
+    /// [`PortError::Setup`] when no runtime folder can be made, or the name is too long for it.
     pub fn new(graph: &str, queues: Queues) -> Result<Self, PortError> {
-        let folder = runtime_folder().join(graph);
+        let domain = Self {
+            graph: graph.to_owned(),
+            folder: runtime_folder().join(graph),
+            queues,
+        };
+        domain.demand_room()?;
+        let failed = |e| {
+            let message = format!("{}: {e}", domain.folder.display());
+            PortError::setup("runtime folder", message)
+        };
         fs::DirBuilder::new()
             .recursive(true)
             .mode(0o700)
-            .create(&folder)
-            .map_err(|e| {
-                PortError::setup("runtime folder", format!("{}: {e}", folder.display()))
-            })?;
-        Ok(Self {
-            graph: graph.to_owned(),
-            folder,
-            queues,
-        })
+            .create(&domain.folder)
+            .map_err(failed)?;
+        Ok(domain)
+    }
+
+    /// Refuses a name that the paths of sockets have no room for.
+    fn demand_room(&self) -> Result<(), PortError> {
+        let prefix_length = self.prefix().len() + START_LENGTH;
+        let excess = excess_bytes(&self.transport_folder(), prefix_length);
+        if excess == 0 {
+            return Ok(());
+        }
+        // Each character of the name is in the path twice.
+        let (excess, path) = (excess.div_ceil(2), self.folder.display());
+        let message = format!("{path} has no room for sockets: {excess} characters too many");
+        Err(PortError::setup("graph's name", message))
     }
 
     /// The place of the running graph of this name; `None` while there is none. Nothing is made.
@@ -295,11 +312,16 @@ impl Domain {
         let mut config = Config::default();
         config.global.prefix = FileName::new(self.transport_prefix().as_bytes())
             .map_err(|e| PortError::setup("shared-memory prefix", e))?;
-        let root = self.folder.join("t");
+        let root = self.transport_folder();
         let root = iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes())
             .map_err(|e| PortError::setup("transport folder", e))?;
         config.global.set_root_path(&root);
         Ok(config)
+    }
+
+    /// Folder of the transport's files, its sockets among them.
+    fn transport_folder(&self) -> PathBuf {
+        self.folder.join("t")
     }
 
     /// File of [`crate::GraphLock`].
@@ -317,7 +339,7 @@ impl Domain {
                 found.push(entry.path());
             }
         }
-        collect_files(&self.folder.join("t"), &mut found);
+        collect_files(&self.transport_folder(), &mut found);
         found
     }
 
@@ -327,7 +349,7 @@ impl Domain {
         for path in self.residue() {
             let _ = fs::remove_file(path);
         }
-        let _ = fs::remove_dir_all(self.folder.join("t"));
+        let _ = fs::remove_dir_all(self.transport_folder());
         for file in [
             self.processes_file(),
             self.types_file(),
@@ -385,35 +407,6 @@ fn collect_files(folder: &Path, found: &mut Vec<PathBuf>) {
             found.push(path);
         }
     }
-}
-
-/// `/run/vigil` where the user may write there, else the user's own runtime folder. Short, since
-/// socket paths are limited to 108 bytes.
-fn runtime_folder() -> PathBuf {
-    let system = PathBuf::from("/run/vigil");
-    if fs::DirBuilder::new()
-        .recursive(true)
-        .mode(0o700)
-        .create(&system)
-        .is_ok()
-        && tempfile_works(&system)
-    {
-        return system;
-    }
-    if let Some(user) = std::env::var_os("XDG_RUNTIME_DIR") {
-        return PathBuf::from(user).join("vigil");
-    }
-    // SAFETY: no arguments, no effects, cannot fail.
-    #[allow(unsafe_code)]
-    let uid = unsafe { libc::getuid() };
-    std::env::temp_dir().join(format!("vigil-{uid}"))
-}
-
-fn tempfile_works(folder: &Path) -> bool {
-    let probe = folder.join(format!(".probe-{}", std::process::id()));
-    let works = File::create(&probe).is_ok();
-    let _ = fs::remove_file(probe);
-    works
 }
 
 #[cfg(test)]
@@ -475,6 +468,15 @@ mod tests {
         domain.remove_residue();
         assert_eq!(prefix(), domain.prefix());
         fs::remove_dir_all(domain.folder()).unwrap();
+    }
+
+    #[test]
+    fn a_name_that_sockets_have_no_room_for_is_refused_and_leaves_nothing_behind() {
+        let name = "a".repeat(80);
+        let error = Domain::new(&name, Queues::default()).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains("has no room for sockets: "), "{text}");
+        assert!(!runtime_folder().join(name).exists());
     }
 
     #[test]

@@ -84,16 +84,18 @@ impl FoundProcess {
 }
 
 /// When a living process began, in ticks: field 22 of `/proc/PID/stat` (proc(5)). The second field
-/// may hold blanks, and ends with the last parenthesis.
+/// may hold blanks, and ends with the last parenthesis. A process whose first thread has ended
+/// lives, and holds its files, until the last has.
 fn began(pid: u32) -> Option<u64> {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
     let mut fields = stat.rsplit_once(") ")?.1.split(' ');
+    // The state is field 3, the number of threads field 20.
     let state = fields.next()?;
-    if ["Z", "X"].contains(&state) {
+    let threads: u32 = fields.nth(16)?.parse().ok()?;
+    if state == "X" || state == "Z" && threads <= 1 {
         return None;
     }
-    // The state is field 3.
-    fields.nth(18)?.parse().ok()
+    fields.nth(1)?.parse().ok()
 }
 
 #[cfg(test)]

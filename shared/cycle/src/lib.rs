@@ -25,6 +25,7 @@ mod port_error;
 pub mod publisher;
 pub mod recorder;
 pub mod report;
+mod runtime_folder;
 mod sealed;
 pub mod serve;
 pub mod service;

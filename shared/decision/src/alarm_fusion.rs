@@ -149,7 +149,8 @@ impl AlarmFusion {
             moved_s: if self.rests() { 0.0 } else { passed_s },
             alarm: stands,
             alarm_t_ns: self.detected.t_ns(),
-            p_nominal: match self.hearing.is_heard() {
+            // Nobody contradicts what was left before the first diagnosis.
+            p_nominal: match self.hearing.is_heard() || self.hearing.is_new() {
                 true => self.p_nominal,
                 false => 0.0,
             },

@@ -300,9 +300,7 @@ impl DecisionRule for FaultDecision {
     fn restore(&mut self, left: &Carryover, believed: Option<&FaultBelief>) {
         let process = &mut self.process;
         process.restore(left, &mut self.latch);
-        let is_sound = |d: &&FaultBelief| state_belief::is_sound(d, &self.states, self.tree_hash);
-        let believed = believed.filter(|_| left.detected_t_capture_ns != 0);
-        if let Some(believed) = believed.filter(is_sound) {
+        if let Some(believed) = believed {
             let answerable = self.wheels.answerable();
             write_weights(
                 believed,

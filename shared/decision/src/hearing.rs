@@ -6,6 +6,8 @@ use vigil_checkpoint::CheckpointValue;
 /// Detections in a row without a diagnosis after which the identifier counts as lost, as every
 /// input of a service does (`vigil_cycle`).
 const LOST_AFTER: u32 = 3;
+/// Probability of faults with a name from which on they are found: even odds.
+const NAMED: f64 = 0.5;
 /// For how long nobody is called once no identifier knows of an alarm, s. Chosen: longer than one
 /// that is replaced takes to begin and to see how a robot in motion fails.
 const RETURN_S: f64 = 5.0;
@@ -24,24 +26,31 @@ pub(crate) struct Hearing {
     unanswered: u32,
     /// Detections beside an alarm in a row without an identifier that knows of it.
     unheard: u32,
-    /// Time since an identifier is waited for, s; 0 while none is.
-    waited_s: f64,
+    /// Time since an identifier is waited for, s, if one is.
+    waited_s: Option<f64>,
+    /// It is waited for since one was lost.
+    was_lost: bool,
 }
 
 impl Hearing {
-    /// Beside this alarm of the detector, before any diagnosis.
+    /// Beside this alarm of the detector, before any diagnosis. Who was heard before is not known:
+    /// whoever is heard now may have begun just before.
     pub(crate) fn beside(alarm: bool) -> Self {
         Self {
             alarm,
+            waited_s: alarm.then_some(0.0),
             ..Self::default()
         }
     }
 
-    /// Takes a sound diagnosis.
-    pub(crate) const fn take_diagnosis(&mut self, diagnosis: &FaultBelief) {
+    /// Takes a sound diagnosis. Another identifier than the one that is waited for has not seen how
+    /// the alarm began: it may find a fault with a name, but nothing inexplicable, and no health.
+    pub(crate) fn take_diagnosis(&mut self, diagnosis: &FaultBelief) {
         self.unanswered = 0;
         self.epoch = diagnosis.header.epoch;
-        self.knows = diagnosis.identifying != 0;
+        let p_named = 1.0 - diagnosis.p[0] - diagnosis.p_unknown;
+        let may_tell = p_named > NAMED || !self.waits() || self.epoch == self.heard_epoch;
+        self.knows = diagnosis.identifying != 0 && may_tell;
     }
 
     /// Takes a detection `passed_s` after the one before, beside the detector's alarm or none.
@@ -58,10 +67,12 @@ impl Hearing {
         let is_another = self.epoch != self.heard_epoch;
         let goes_on = alarm && self.waits() && (is_another || !is_heard);
         self.waited_s = match goes_on || self.unheard >= LOST_AFTER {
-            true => self.waited_s + passed_s,
-            false => 0.0,
+            true => Some(self.waited_s.unwrap_or(0.0) + passed_s),
+            false => None,
         };
-        if is_heard && self.waited_s == 0.0 {
+        self.was_lost |= self.unheard >= LOST_AFTER;
+        self.was_lost &= self.waited_s.is_some();
+        if is_heard && self.waited_s.is_none() {
             self.heard_epoch = self.epoch;
         }
     }
@@ -77,7 +88,7 @@ impl Hearing {
 
     /// Another run begins: nobody is waited for.
     pub(crate) const fn begin_run(&mut self) {
-        (self.unheard, self.waited_s) = (0, 0.0);
+        (self.unheard, self.waited_s, self.was_lost) = (0, None, false);
     }
 
     /// An alarm does not stand, or the identifier knows of it. One that was replaced has to see
@@ -87,24 +98,29 @@ impl Hearing {
         knows || !self.alarm
     }
 
+    /// An earlier supervisor was replaced just now: no diagnosis has come since, and none is lost.
+    pub(crate) const fn is_new(&self) -> bool {
+        self.waited_s.is_some() && self.epoch == 0 && !self.was_lost
+    }
+
     /// It is not heard, but for a few cycles only.
     pub(crate) const fn is_late(&self) -> bool {
         !self.is_heard() && !self.is_lost()
     }
 
-    /// It is not heard, and has not been for some cycles.
+    /// It is not heard, and has not been for some cycles, or was lost before.
     pub(crate) const fn is_lost(&self) -> bool {
-        !self.is_heard() && (self.unheard >= LOST_AFTER || self.waited_s > 0.0)
+        !self.is_heard() && (self.unheard >= LOST_AFTER || self.was_lost)
     }
 
     /// Another one is waited for: before its first result what was believed stands.
     pub(crate) const fn waits(&self) -> bool {
-        self.waited_s > 0.0 && self.waited_s < RETURN_S
+        matches!(self.waited_s, Some(waited_s) if waited_s < RETURN_S)
     }
 
     /// It has been heard for a while, or was not for so long that it is not waited for: help may be
     /// called.
     pub(crate) const fn may_latch(&self) -> bool {
-        !self.waits() && (self.waited_s > 0.0 || self.is_heard())
+        !self.waits() && (self.waited_s.is_some() || self.is_heard())
     }
 }

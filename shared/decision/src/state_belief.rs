@@ -86,14 +86,17 @@ pub(crate) fn write_fallback(
     before: &[f64],
     weights: &mut [f64],
 ) {
-    let p_fault = match situation.alarm {
-        true => situation.p_fault.clamp(0.0, 1.0),
-        false => 0.0,
-    };
     let is_fault =
         |meaning: &StateMeaning| !matches!(meaning.subject, Subject::Nominal | Subject::Done);
     let of_faults = before.iter().zip(states).filter(|(_, m)| is_fault(m));
     let faulty: f64 = of_faults.map(|(b, _)| b).sum();
+    // A detector that has just raised an alarm of its own may hold a fault for less probable than
+    // what was known: that stands while another identifier is waited for.
+    let p_fault = match (situation.alarm, situation.hearing.waits()) {
+        (true, true) => situation.p_fault.clamp(faulty.min(1.0), 1.0),
+        (true, false) => situation.p_fault.clamp(0.0, 1.0),
+        (false, _) => 0.0,
+    };
     let unknown = position(states, Subject::Unknown);
     let weights = weights.iter_mut().enumerate();
     for (((state, weight), b), meaning) in weights.zip(before).zip(states) {

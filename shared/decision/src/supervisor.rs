@@ -104,6 +104,9 @@ impl Supervisor {
     /// Goes on from what an earlier supervisor of the same graph has left, and what it told of.
     pub fn restore(&mut self, left: &Carryover, believed: Option<&FaultBelief>) {
         self.fusion.restore(left);
+        // What was believed is of use beside an alarm of the detector.
+        let believed = believed.filter(|_| left.detected_t_capture_ns != 0);
+        let believed = believed.filter(|it| self.rule.is_sound(it));
         self.rule.restore(left, believed);
     }
 

@@ -349,8 +349,6 @@ impl DecisionRule for SymptomDecision {
 
     fn restore(&mut self, left: &Carryover, believed: Option<&FaultBelief>) {
         self.process.restore(left, &mut self.latch);
-        let believed = believed.filter(|_| left.detected_t_capture_ns != 0);
-        let believed = believed.filter(|it| self.is_sound(it));
         if let (Some(believed), Some(hardware)) = (believed, &mut self.hardware) {
             let (answerable, belief) = (self.wheels.answerable(), self.process.tracker.belief());
             let stands = Situation {

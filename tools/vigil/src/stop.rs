@@ -108,19 +108,23 @@ fn stop_services(domain: &Domain) -> Result<(), CommandError> {
         }
     }
     // Who holds the lock now has no service alive.
-    if let Some(lock) = domain.lock().map_err(CommandError::failure)? {
-        // Whoever ends this command: nobody starts the graph while its last seconds are written.
-        lock.share_with_children();
-        if let Some(programs) = std::env::current_exe()
-            .ok()
-            .as_deref()
-            .and_then(Path::parent)
-        {
-            vigil_launcher::rescue(programs, domain);
-        }
-        domain.remove_residue();
-        EventWriter::remove(&domain.events_file());
+    let mut lock = Ok(None);
+    until(PROCESS_LIMIT, || {
+        lock = domain.lock();
+        !matches!(lock, Ok(None))
+    });
+    let Some(lock) = lock.map_err(CommandError::failure)? else {
+        let message = "a process of it is left that could not be ended: nothing was removed";
+        return Err(CommandError::failure(message));
+    };
+    // Whoever ends this command: nobody starts the graph while its last seconds are written.
+    lock.share_with_children();
+    let program = std::env::current_exe().ok();
+    if let Some(programs) = program.as_deref().and_then(Path::parent) {
+        vigil_launcher::rescue(programs, domain);
     }
+    domain.remove_residue();
+    EventWriter::remove(&domain.events_file());
     Ok(())
 }
 

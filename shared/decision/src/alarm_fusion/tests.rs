@@ -142,6 +142,65 @@ fn the_alarm_that_an_earlier_supervisor_left_goes_on_and_is_left_again() {
 }
 
 #[test]
+fn an_alarm_that_the_identifier_had_ended_does_not_rise_as_the_supervisor_is_replaced() {
+    let ended = Carryover {
+        detected_t_capture_ns: MS,
+        alarm_count: 3,
+        ..Carryover::default()
+    };
+    let mut fusion = AlarmFusion::new(0.5);
+    fusion.restore(&ended);
+    let mut next = |t_ms, answer: Option<f64>| {
+        let diagnosis = answer.map(diagnosis);
+        take(&mut fusion, Some(&detection(t_ms, 1)), diagnosis.as_ref());
+        fusion.situation().alarm
+    };
+    assert_eq!([10, 20].map(|t_ms| next(t_ms, None)), [false; 2]);
+    assert!(!next(30, Some(0.9)));
+    assert!(next(40, Some(0.2)), "the identifier doubts");
+}
+
+#[test]
+fn beside_an_alarm_of_an_earlier_supervisor_help_is_called_after_five_seconds() {
+    let left = Carryover {
+        detected_t_capture_ns: 7,
+        ..Carryover::default()
+    };
+    let mut fusion = AlarmFusion::new(0.5);
+    fusion.restore(&left);
+    let mut heard = diagnosis(0.0);
+    heard.header.epoch = 8;
+    for step in 1..=520 {
+        let alarm = detection(10 * step, 1);
+        take(&mut fusion, Some(&alarm), Some(&heard));
+        let hearing = fusion.situation().hearing;
+        assert!(hearing.is_heard(), "{step}");
+        let is_between = (495..505).contains(&step);
+        assert!(is_between || hearing.may_latch() == (step > 500), "{step}");
+    }
+    // Who has not seen how the alarm began finds neither health nor what is inexplicable.
+    for (p_nominal, p_unknown) in [(0.7, 0.1), (0.1, 0.8), (0.4, 0.2)] {
+        fusion.restore(&left);
+        (heard.p[0], heard.p_unknown) = (p_nominal, p_unknown);
+        for step in 1..=520 {
+            take(&mut fusion, Some(&detection(10 * step, 1)), Some(&heard));
+            let is_heard = fusion.situation().hearing.is_heard();
+            let is_between = (495..505).contains(&step);
+            assert!(is_between || is_heard == (step > 500), "{step}");
+        }
+    }
+    // Nor does it call before that if no identifier comes; that is a loss from the third cycle on.
+    fusion.restore(&left);
+    for step in 1..=520 {
+        take(&mut fusion, Some(&detection(10 * step, 1)), None);
+        let hearing = fusion.situation().hearing;
+        assert_eq!(hearing.is_lost(), step >= 3, "{step}");
+        let is_between = (495..505).contains(&step);
+        assert!(is_between || hearing.may_latch() == (step > 500), "{step}");
+    }
+}
+
+#[test]
 fn an_identifier_that_is_lost_is_waited_for_before_help_is_called() {
     let mut fusion = AlarmFusion::new(0.5);
     let (mut t_ms, heard) = (0, diagnosis(0.0));

@@ -182,8 +182,7 @@ impl Identifier {
         }
     }
 
-    /// Takes one entry of the journal and fills the belief and the hypotheses (headers and causes
-    /// are the caller's).
+    /// Takes an entry of the journal, and fills belief and hypotheses but for headers and causes.
     pub fn step(
         &mut self,
         entry: Entry<Input<'_>>,
@@ -282,9 +281,10 @@ impl Identifier {
 
     /// Adds the last observation to the ring; the oldest gives way.
     fn keep(&mut self, input: &Input<'_>) {
-        let healthy = input
-            .detection
-            .and_then(|(_, block)| Healthy::from_block(&block.healthy, self.unsure.wheels));
+        // A new detector may take an old fault for health: its belief counts after the first pose.
+        let detection = input.detection.filter(|_| self.ring.has_pose());
+        let healthy =
+            detection.and_then(|(_, it)| Healthy::from_block(&it.healthy, self.unsure.wheels));
         if let (Some(stage), Some(read)) = (&mut self.further, self.observer.further()) {
             let healthy = healthy.as_ref().unwrap_or(&self.unsure);
             let suspects = self.detection.suspects;

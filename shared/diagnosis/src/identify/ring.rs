@@ -43,6 +43,8 @@ pub(crate) struct Ring {
     interval_s: f64,
     /// Newest time of the run so far, ns: a clock that is set back leaves onsets behind it.
     newest_ns: u64,
+    /// The run has had a pose.
+    has_pose: bool,
 }
 
 impl Ring {
@@ -53,6 +55,7 @@ impl Ring {
             capacity,
             interval_s,
             newest_ns: 0,
+            has_pose: false,
         }
     }
 
@@ -76,10 +79,15 @@ impl Ring {
         self.newest_ns
     }
 
+    /// True once an entry of the run had a pose.
+    pub(crate) const fn has_pose(&self) -> bool {
+        self.has_pose
+    }
+
     /// A new run begins.
     pub(crate) fn clear(&mut self) {
         self.entries.clear();
-        self.newest_ns = 0;
+        (self.newest_ns, self.has_pose) = (0, false);
     }
 
     /// Adds an entry; true if the oldest gave way.
@@ -92,6 +100,7 @@ impl Ring {
             self.entries.pop_front();
         }
         self.newest_ns = self.newest_ns.max(entry.observation.t_ns);
+        self.has_pose |= entry.observation.pose_frames > 0;
         self.entries.push_back(entry);
         invariants::within_capacity(self.entries.len(), self.capacity);
         is_full
@@ -168,10 +177,12 @@ mod tests {
         let mut ring = Ring::new(8, 0.05);
         assert_eq!(ring.start(), 0);
         ring.push(entry(1, 0));
-        assert_eq!(ring.start(), 0);
+        assert_eq!((ring.start(), ring.has_pose()), (0, false));
         ring.push(entry(2, 1));
         ring.push(entry(3, 1));
-        assert_eq!(ring.start(), 1);
+        assert_eq!((ring.start(), ring.has_pose()), (1, true));
+        ring.clear();
+        assert!(!ring.has_pose());
     }
 
     #[test]
