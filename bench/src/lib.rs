@@ -1,6 +1,7 @@
 //! What the questions share: the archive of results, facts about the machine, simulated drives.
 
 use std::error::Error;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
@@ -43,6 +44,14 @@ pub fn ended(name: &str, result: Result<(), Box<dyn Error>>) -> ExitCode {
 #[must_use]
 pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// A program that was built beside this one.
+///
+/// # Errors
+/// The system's, where this program's path is not known.
+pub fn program(name: &str) -> io::Result<PathBuf> {
+    Ok(std::env::current_exe()?.with_file_name(name))
 }
 
 /// The graph of a configuration file; of `config/` if the path is relative.

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use vigil_cycle::{Domain, signal};
 
 use crate::process_time::cpu_s;
+use crate::program;
 
 /// Time in which it makes its ring, or ends.
 const LIMIT: Duration = Duration::from_secs(20);
@@ -69,8 +70,7 @@ impl Process {
 
     /// Starts it, as the launcher does.
     pub fn spawn(&mut self) -> io::Result<()> {
-        let program = std::env::current_exe()?.with_file_name("vigil-blackbox");
-        let mut command = Command::new(program);
+        let mut command = Command::new(program("vigil-blackbox")?);
         command.args(["--graph", self.domain.graph()]);
         command.stdin(Stdio::null()).stdout(Stdio::null());
         self.child = Some(command.stderr(Stdio::null()).spawn()?);

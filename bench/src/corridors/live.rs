@@ -18,7 +18,7 @@ use super::plan::CorridorPlan;
 use super::score::{CorridorScore, Step, Tally, pose_error};
 use super::{CorridorGraph, LIMIT_S};
 use crate::missions::{PresentFault, RuleOutput};
-use crate::{find_models, in_folder};
+use crate::{find_models, in_folder, program};
 
 /// Interval at which blocks are taken: an eighth of a queue of 100 Hz.
 const POLL: Duration = Duration::from_millis(20);
@@ -100,7 +100,7 @@ impl RunningGraph {
         let mut file = Table::try_from(&setup.file)?;
         find_models(&mut file)?;
         fs::write(&config, file.to_string())?;
-        let mut command = Command::new(std::env::current_exe()?.with_file_name("vigil-launcher"));
+        let mut command = Command::new(program("vigil-launcher")?);
         command.arg("--config").arg(&config);
         command.args(["--json", "--no-blackbox"]);
         if let Some(fault) = &plan.hardware {

@@ -14,7 +14,7 @@ use vigil_cycle::{CycleStamps, PortError, stamps};
 use vigil_setup::Setup;
 
 use crate::chain::{STAGE_NAMES, STAGES};
-use crate::{find_models, root};
+use crate::{find_models, program, root};
 
 /// What is changed in the default graph.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,7 +89,7 @@ impl GraphFile {
         let is_faulty = change.is_faulty;
         Ok(Self {
             path,
-            launcher: std::env::current_exe()?.with_file_name("vigil-launcher"),
+            launcher: program("vigil-launcher")?,
             setup,
             is_faulty,
         })

@@ -4,14 +4,14 @@
 //! computes it again once the graph has ended.
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::latency::graph::{Change, GraphFile};
 use vigil_bench::launched::Launched;
-use vigil_bench::machine;
+use vigil_bench::{machine, program};
 use vigil_robot::FaultTree;
 
 /// Least factor at which it is to be computed.
@@ -108,10 +108,6 @@ fn record(graph: &GraphFile, recording: &Path) -> Result<(), Box<dyn Error>> {
         true => Ok(()),
         false => Err(String::from_utf8_lossy(&output.stderr).into_owned().into()),
     }
-}
-
-fn program(name: &str) -> std::io::Result<PathBuf> {
-    Ok(std::env::current_exe()?.with_file_name(name))
 }
 
 /// What a program has printed, whatever it ended with.

@@ -15,6 +15,7 @@ use vigil_bench::latency::graph::{Change, GraphFile};
 use vigil_bench::launched::Launched;
 use vigil_bench::machine;
 use vigil_bench::process_time::{children, cpu_s};
+use vigil_bench::program;
 use vigil_cycle::signal;
 
 /// Largest share of a core, %.
@@ -46,7 +47,7 @@ struct Terminal {
 
 impl Terminal {
     fn open(graph: &str, folder: &Path) -> Result<Self, Box<dyn Error>> {
-        let vigil = std::env::current_exe()?.with_file_name("vigil");
+        let vigil = program("vigil")?;
         let words = format!(
             "stty cols 120 rows 40; exec {} top --graph {graph}",
             vigil.display()

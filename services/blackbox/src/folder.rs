@@ -1,11 +1,11 @@
 //! The folder of a graph's recordings: names, and a bound on their sum.
 
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use vigil_flight::FlightError;
+use vigil_flight::{FlightError, is_being_written};
 use vigil_setup::RunningGraph;
 
 /// How a recording ends that is not finished.
@@ -146,12 +146,6 @@ impl RecordingsFolder {
         });
         files.collect()
     }
-}
-
-/// True while somebody writes the file: its writer holds a lock.
-fn is_being_written(path: &Path) -> bool {
-    let file = File::open(path);
-    file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }
 
 /// Gives an unfinished recording a proper name; one without content is removed.

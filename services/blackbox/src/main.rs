@@ -43,6 +43,9 @@ struct Args {
     /// Time to record, s; until it is asked to stop if it is not given.
     #[arg(long, value_name = "S", requires = "record")]
     duration: Option<f64>,
+    /// Print one JSON document about what was recorded.
+    #[arg(long, requires = "record")]
+    json: bool,
 }
 
 impl Args {
@@ -65,7 +68,7 @@ impl Args {
         match &self.record {
             Some(path) => {
                 let duration = self.duration.map(Duration::try_from_secs_f64);
-                let is_something = record::run(running, path, duration.transpose()?)?;
+                let is_something = record::run(running, path, duration.transpose()?, self.json)?;
                 Ok(u8::from(!is_something))
             }
             None => watch::run(running).map(|()| 0),

@@ -9,6 +9,7 @@ use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use vigil_blackbox::RecordDocument;
 use vigil_cycle::port::Link;
 use vigil_cycle::{Clock, Graph, Monotonic, signal};
 use vigil_flight::part_path;
@@ -28,7 +29,8 @@ const TOLD: Duration = Duration::from_secs(1);
 const MIB: f64 = (1 << 20) as f64;
 
 /// Records into `path` until the duration is over, somebody ends it, or the graph ends. What lies
-/// at `path` is replaced by it. True if there was something to record.
+/// at `path` is replaced by it. Says what was written, as JSON for programs. True if there was
+/// something to record.
 ///
 /// # Errors
 /// The transport's, and those of the file. What was written by then stays, with `.part` after its
@@ -37,31 +39,38 @@ pub fn run(
     running: RunningGraph,
     path: &Path,
     duration: Option<Duration>,
+    json: bool,
 ) -> Result<bool, Box<dyn Error>> {
     signal::install();
     let destination = Destination::File(path.to_owned());
     let material = Arc::new(Material::new(running, destination)?);
-    match record(&material, path, duration)?.finish() {
-        Ok(written) => {
-            tell(&written)?;
-            Ok(true)
-        }
+    let progress = Progress::new(path, !json && io::stderr().is_terminal());
+    let written = match record(&material, progress, duration)?.finish() {
+        Ok(written) => Some(written),
         Err(nothing @ RecordingError::Nothing) => {
             say(&nothing.to_string());
-            Ok(false)
+            None
         }
-        Err(error) => Err(error.into()),
+        Err(error) => return Err(error.into()),
+    };
+    let said = match json {
+        true => Some(serde_json::to_string_pretty(&document(written.as_ref()))?),
+        false => written.as_ref().map(text),
+    };
+    if let Some(said) = said {
+        print(&said)?;
     }
+    Ok(written.is_some())
 }
 
 /// Takes what comes until the end; the recording that is still being written.
 fn record(
     material: &Arc<Material>,
-    path: &Path,
+    mut progress: Progress,
     duration: Option<Duration>,
 ) -> Result<Recording, Box<dyn Error>> {
     let running = &material.running;
-    let (mut ring, mut progress) = (ring(running)?, Progress::new(path));
+    let mut ring = ring(running)?;
     let mut feeds = Feeds::open(&Graph::SharedMemory(Link::join(&running.domain, "record")?))?;
     let recording = Recording::start(material, ring.reader(), order(duration));
     let pause = running.setup.observer_pause();
@@ -108,8 +117,19 @@ fn order(duration: Option<Duration>) -> Order {
     }
 }
 
-/// Says what was written; that nobody reads it is no reason to fail.
-fn tell(written: &Written) -> io::Result<()> {
+fn document(written: Option<&Written>) -> RecordDocument {
+    RecordDocument {
+        schema_version: 1,
+        recording: written.map(|it| it.path.display().to_string()),
+        bytes: written.map_or(0, |it| it.bytes),
+        recorded_s: written.map_or(0.0, |it| it.covered.as_secs_f64()),
+        blocks: written.map_or(0, |it| it.blocks),
+        lost: written.map_or(0, |it| it.lost),
+        gaps: written.map_or(0, |it| it.gaps),
+    }
+}
+
+fn text(written: &Written) -> String {
     let mut text = format!(
         "{}: {:.1} s, {:.1} MiB, {} blocks",
         written.path.display(),
@@ -123,6 +143,11 @@ fn tell(written: &Written) -> io::Result<()> {
     if written.gaps > 0 {
         text.push_str(&format!(", {} gaps: the disk is too slow", written.gaps));
     }
+    text
+}
+
+/// Prints a line; a closed pipe is no failure.
+fn print(text: &str) -> io::Result<()> {
     match writeln!(io::stdout(), "{text}") {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error),
         _ => Ok(()),
@@ -138,13 +163,13 @@ struct Progress {
 }
 
 impl Progress {
-    fn new(path: &Path) -> Self {
+    fn new(path: &Path, is_shown: bool) -> Self {
         let now = Instant::now();
         Self {
             part: part_path(path),
             began: now,
             told: now,
-            is_shown: io::stderr().is_terminal(),
+            is_shown,
         }
     }
 

@@ -13,6 +13,7 @@ use crate::cdr::Cdr;
 use crate::error::FlightError;
 use crate::message_times::MessageTimes;
 use crate::messages::message::Message;
+use crate::part::{lock, part_path};
 use crate::summary::FlightSummary;
 use crate::topics::RosTopic;
 
@@ -66,14 +67,6 @@ pub(crate) struct Container {
     cdr: Cdr,
 }
 
-/// Where a recording stands until it is whole.
-#[must_use]
-pub fn part_path(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".part");
-    name.into()
-}
-
 /// How files are written, but for their chunks.
 pub(crate) fn options() -> WriteOptions {
     WriteOptions::new()
@@ -92,8 +85,8 @@ impl Container {
             source,
         };
         let file = File::create(&part_path).map_err(failed)?;
-        // Nobody mends what is still being written. A file system without locks has none.
-        let _ = file.try_lock();
+        // Nobody mends what is still being written.
+        lock(&file);
         let stream = BufWriter::new(file.try_clone().map_err(failed)?);
         let writer = options()
             .chunk_size(None)

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use thiserror::Error;
+use vigil_setup::SetupError;
 
 /// Why a flight cannot be written or read. What was flushed before stays in the partial file.
 #[derive(Debug, Error)]
@@ -50,6 +51,18 @@ pub enum FlightError {
         path: PathBuf,
         /// The name of the compression.
         how: String,
+    },
+    /// The file does not hold what its graph ran on, so nothing in it has a name.
+    #[error("{} does not hold what its graph ran on (document.toml)", path.display())]
+    NoDocument {
+        /// The file.
+        path: PathBuf,
+    },
+    /// What the graph ran on is not what this version reads.
+    #[error("what the graph ran on cannot be read: {source}")]
+    Document {
+        /// What is wrong with it, and in which file.
+        source: SetupError,
     },
     /// The file has an end: there is nothing to mend.
     #[error("{} is whole", path.display())]

@@ -10,6 +10,7 @@ use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, parse_record};
 use vigil_cycle::topic::Topic;
+use vigil_setup::{Document, Setup};
 use vigil_timeline::TimelineEntry;
 
 use crate::container::{FOREIGN, LIBRARY, RAW};
@@ -160,6 +161,22 @@ impl FlightReader {
     #[must_use]
     pub fn document(&self) -> Option<&str> {
         self.document.as_deref()
+    }
+
+    /// What the graph ran on.
+    ///
+    /// # Errors
+    /// It was not recorded, or is not what this version reads.
+    pub fn setup(&self) -> Result<Setup, FlightError> {
+        let text = self
+            .document
+            .clone()
+            .ok_or_else(|| FlightError::NoDocument {
+                path: self.path.clone(),
+            })?;
+        let document = Document::from_text(&self.path, text);
+        let setup = document.and_then(|document| document.check());
+        setup.map_err(|source| FlightError::Document { source })
     }
 
     /// Why the file was written, by name. Before the end it may be less than at the end.

@@ -111,6 +111,10 @@ fn what_was_written_is_read_in_its_order() {
     assert_eq!(detection.p_fault, 2.0);
     assert_eq!(read_block::<SensorFrame>(&found[4].2), None);
     assert_eq!(reader.next().unwrap(), None, "the end stays the end");
+    // This document is too short for a graph.
+    let error = reader.setup().map(|_| ()).unwrap_err().to_string();
+    let begin = format!("what the graph ran on cannot be read: {}", path.display());
+    assert!(error.starts_with(&begin), "{error}");
 }
 
 /// A cut file can be made whole: it holds the same, says that it was cut, and has an end and an
@@ -193,16 +197,22 @@ fn other_files_are_refused_by_name() {
     assert!(text.starts_with("cannot read /missing.mcap: "), "{text}");
 }
 
+/// Changes a bit of the last detection; where that is, and the file's new content.
+fn damage(path: &Path) -> (usize, Vec<u8>) {
+    let mut content = fs::read(path).unwrap();
+    let is_last = |at: &usize| content[*at..].starts_with(bytes_of(&5.0_f64));
+    let at = (0..content.len()).rev().find(is_last).unwrap();
+    content[at] ^= 1;
+    fs::write(path, &content).unwrap();
+    (at, content)
+}
+
 #[test]
 fn of_a_damaged_file_with_an_end_what_comes_before_the_damage_is_kept() {
     let folder = tempfile::tempdir().unwrap();
     let [path, whole] = ["a.mcap", "b.mcap"].map(|name| folder.path().join(name));
     let told = write(&path);
-    let mut content = fs::read(&path).unwrap();
-    let is_last = |at: &usize| content[*at..].starts_with(bytes_of(&5.0_f64));
-    let at = (0..content.len()).rev().find(is_last).unwrap();
-    content[at] ^= 1;
-    fs::write(&path, &content).unwrap();
+    let (at, mut content) = damage(&path);
     assert!(has_end(&path).unwrap());
     let mended = mend(&path, &whole).unwrap();
     assert!(mended.damage.is_some() && mended.messages > 0);
@@ -224,11 +234,7 @@ fn a_chunk_with_another_byte_is_found_and_what_came_before_it_stays() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     let told = write(&path);
-    let mut content = fs::read(&path).unwrap();
-    let is_last = |at: &usize| content[*at..].starts_with(bytes_of(&5.0_f64));
-    let at = (0..content.len()).rev().find(is_last).unwrap();
-    content[at] ^= 1;
-    fs::write(&path, &content).unwrap();
+    damage(&path);
     let mut reader = FlightReader::open(&path).unwrap();
     let mut count = 0;
     let error = loop {

@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 
 mod belief;
-mod error;
 mod events;
 mod gaps;
 mod health;
@@ -13,5 +12,4 @@ mod recording;
 mod spans;
 mod verdict;
 
-pub use error::PageError;
 pub use recording::page;

@@ -11,11 +11,10 @@ use vigil_pages::bands::{Bands, Row};
 use vigil_pages::chart::Axis;
 use vigil_pages::page::{Section, page as html, remark, table, titled};
 use vigil_robot::channel::hash;
-use vigil_setup::{Document, Setup};
+use vigil_setup::Setup;
 use vigil_timeline::WallClock;
 
 use crate::belief::{Beliefs, WIDTH};
-use crate::error::PageError;
 use crate::events::{Events, time_of_day};
 use crate::gaps::Gaps;
 use crate::health::Healths;
@@ -60,16 +59,9 @@ struct Ending {
 /// # Errors
 /// A file that is no recording, or without what its graph ran on. A file that is cut short or
 /// damaged has a page of what comes before.
-pub fn page(path: &FilePath) -> Result<String, PageError> {
+pub fn page(path: &FilePath) -> Result<String, FlightError> {
     let mut reader = FlightReader::open(path)?;
-    let text = reader.document().ok_or_else(|| PageError::Nameless {
-        path: path.to_owned(),
-    })?;
-    let setup = Document::from_text(path, text.to_owned()).and_then(|document| document.check());
-    let mut recording = Recording::new(setup.map_err(|source| PageError::Document {
-        path: path.to_owned(),
-        source,
-    })?);
+    let mut recording = Recording::new(reader.setup()?);
     let ending = recording.read(&mut reader)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let facts = recording.facts(&name, &reader, &ending);

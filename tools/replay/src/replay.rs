@@ -12,7 +12,7 @@ use vigil_blocks::{
 use vigil_cycle::Topic;
 use vigil_cycle::topic::ServiceName;
 use vigil_flight::{FlightReader, Recorded, read_block};
-use vigil_setup::{Document, Setup};
+use vigil_setup::Setup;
 
 use crate::blocks::{Blocks, Hypotheses, Window};
 use crate::difference::{self, Difference};
@@ -93,9 +93,7 @@ impl Replay {
     /// [`ReplayError`].
     pub fn open(path: &Path) -> Result<Self, ReplayError> {
         let file = FlightReader::open(path)?;
-        let text = file.document().map(str::to_owned);
-        let text = text.ok_or_else(|| ReplayError::NoDocument(path.to_owned()))?;
-        let setup = Document::from_text(path, text)?.check()?;
+        let setup = file.setup()?;
         let begin =
             |service| Step::new(service, &setup).map(|step| ServiceReplay::new(service, step));
         let [first, second, third] = ServiceName::STEPPING;

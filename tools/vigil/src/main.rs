@@ -69,6 +69,7 @@ enum Command {
     #[command(mut_args(only_of_the_border))]
     CheckPublisher(check_publisher::Args),
     Config(config::Args),
+    #[command(mut_args(only_of_a_drawing))]
     Graph(graph::Args),
     #[command(mut_args(only_of_the_border))]
     Record(record::Args),
@@ -88,6 +89,13 @@ enum Command {
 fn only_of_the_border(arg: Arg) -> Arg {
     let id = arg.get_id().as_str();
     let is_other = ["seed", "identifier", "replay", "runs", "speed"].contains(&id);
+    arg.hide(is_other)
+}
+
+/// Options of a graph that change nothing in its drawing are not shown there.
+fn only_of_a_drawing(arg: Arg) -> Arg {
+    let id = arg.get_id().as_str();
+    let is_other = ["seed", "identifier", "runs", "speed"].contains(&id);
     arg.hide(is_other)
 }
 

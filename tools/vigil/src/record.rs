@@ -52,7 +52,8 @@ pub struct Args {
     /// Replace FILE if it is there. A table of frames is replaced without it.
     #[arg(long)]
     force: bool,
-    /// Print one JSON document, of frames only.
+    /// Print one JSON document; its schema: `vigil schema record`, of a recording
+    /// `vigil schema record-mcap`.
     #[arg(long)]
     json: bool,
 }

@@ -1,11 +1,12 @@
 //! `vigil recordings`: what the black box of a graph has written.
 
-use std::fs::{self, TryLockError};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use vigil_flight::is_being_written;
 use vigil_setup::{NotRunning, RunningArgs, load_graph};
 use vigil_terminal::{CommandError, Outcome, output};
 use vigil_timeline::unix_time_of_day;
@@ -112,12 +113,6 @@ fn find(args: &Args, why: &NotRunning) -> Result<(String, PathBuf), CommandError
     Ok((graph, found))
 }
 
-/// True while somebody writes the file: its writer holds a lock.
-fn is_locked(path: &Path) -> bool {
-    let file = fs::File::open(path);
-    file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
-}
-
 fn listed(folder: &Path, graph: &str) -> Vec<ListedRecording> {
     let begin = format!("{graph}-");
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
@@ -133,7 +128,7 @@ fn listed(folder: &Path, graph: &str) -> Vec<ListedRecording> {
             name,
             bytes: metadata.len(),
             written_unix_s: written.as_secs_f64(),
-            is_being_written: is_part && is_locked(&entry.path()),
+            is_being_written: is_part && is_being_written(&entry.path()),
         })
     });
     let mut recordings: Vec<ListedRecording> = recordings.collect();

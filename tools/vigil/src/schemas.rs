@@ -3,6 +3,7 @@
 use std::ffi::OsStr;
 use std::path::PathBuf;
 
+use vigil_blackbox::RecordDocument;
 use vigil_launcher::Summary;
 use vigil_terminal::schema::{self, CommandSchema};
 use vigil_terminal::{CommandError, Outcome};
@@ -24,8 +25,8 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
-/// The commands of this program that print JSON, each with its schema.
-const SCHEMAS: [CommandSchema; 10] = [
+/// The documents that commands of this program print, each with its schema.
+const SCHEMAS: [CommandSchema; 11] = [
     CommandSchema::new::<Summary>("run"),
     CommandSchema::new::<list::Document>("list"),
     CommandSchema::new::<status::Document>("status"),
@@ -35,6 +36,7 @@ const SCHEMAS: [CommandSchema; 10] = [
     CommandSchema::new::<check_publisher::Document<'_>>("check-publisher"),
     CommandSchema::new::<config::Effective<'_>>("config"),
     CommandSchema::new::<record::Document>("record"),
+    CommandSchema::new::<RecordDocument>("record-mcap"),
     CommandSchema::new::<recordings::Document>("recordings"),
 ];
 

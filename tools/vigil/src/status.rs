@@ -14,7 +14,7 @@ use vigil_terminal::{CommandError, Outcome, output};
 use crate::faults::document::Now;
 use crate::watch::Watch;
 
-pub use belief::Diagnosis;
+pub use belief::{Diagnosis, NamedNode};
 pub use decision::Decision;
 pub use document::Document;
 pub use service::Service;

@@ -9,7 +9,6 @@ use vigil_cycle::topic::Topic;
 use vigil_flight::{FlightError, FlightReader, Recorded, read_block};
 use vigil_recording::RunWriter;
 use vigil_robot::channel;
-use vigil_setup::Document as Configuration;
 use vigil_terminal::{CommandError, Outcome, output};
 
 /// Writes the frames of a recording as a table, to learn from, to diagnose or to play back.
@@ -82,12 +81,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
 
 fn write(recording: &Path, out: &Path) -> Result<Document, CommandError> {
     let mut reader = FlightReader::open(recording).map_err(CommandError::usage)?;
-    let text = reader.document().ok_or_else(|| {
-        let path = recording.display();
-        CommandError::usage(format!("{path}: it does not hold what its graph ran on"))
-    })?;
-    let setup = Configuration::from_text(recording, text.to_owned()).and_then(|it| it.check());
-    let setup = setup.map_err(CommandError::usage)?;
+    let setup = reader.setup().map_err(CommandError::usage)?;
     let robot_hash = channel::hash(&setup.robot);
     let mut writer = RunWriter::new(&setup.robot, setup.file.graph.rate_hz, out);
     let mut strange = 0;

@@ -2,8 +2,9 @@
 
 use std::convert::Infallible;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use vigil_flight::part_path;
 use vigil_setup::RunningArgs;
 use vigil_terminal::CommandError;
 
@@ -11,7 +12,7 @@ use super::Args;
 use crate::beside;
 
 /// Options that mean something to frames alone.
-const OF_FRAMES: [&str; 10] = [
+const OF_FRAMES: [&str; 9] = [
     "--config",
     "--rate",
     "--seed",
@@ -21,7 +22,6 @@ const OF_FRAMES: [&str; 10] = [
     "--replay",
     "--runs",
     "--speed",
-    "--json",
 ];
 
 /// True for the name of a recording.
@@ -45,12 +45,15 @@ pub fn record(args: &Args) -> Result<Infallible, CommandError> {
     let path = args.path();
     demand_room(path, args.force)?;
     let graph = running.domain.graph();
-    eprintln!("recording graph '{graph}'; end with Ctrl-C");
+    if !args.json {
+        eprintln!("recording graph '{graph}'; end with Ctrl-C");
+    }
     let mut words: Vec<OsString> = vec!["--graph".into(), graph.into()];
     words.extend(["--record".into(), path.into()]);
     if let Some(seconds) = args.duration {
         words.extend(["--duration".into(), seconds.to_string().into()]);
     }
+    words.extend(args.json.then(|| "--json".into()));
     let program = beside::Program {
         name: "vigil-blackbox",
         build: "-p vigil-blackbox",
@@ -74,9 +77,7 @@ fn demand_room(path: &Path, is_forced: bool) -> Result<(), CommandError> {
         let message = format!("{} is no folder", folder.display());
         return Err(CommandError::usage(message));
     }
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    let part = PathBuf::from(part);
+    let part = part_path(path);
     let there = [path, &part].into_iter().find(|file| file.exists());
     match there {
         Some(file) if !is_forced => {
@@ -95,7 +96,6 @@ mod tests {
     fn options_about_frames_are_found_by_name() {
         let found = |words: &[&str]| option_of_frames(words.iter().map(OsString::from));
         assert_eq!(found(&["record", "a.mcap", "--rate=5"]), Some("--rate"));
-        assert_eq!(found(&["record", "a.mcap", "--json"]), Some("--json"));
         let own = [
             "record",
             "a.mcap",
@@ -104,6 +104,7 @@ mod tests {
             "--duration",
             "2",
             "--force",
+            "--json",
         ];
         assert_eq!(found(&own), None);
     }

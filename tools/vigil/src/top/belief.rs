@@ -7,7 +7,7 @@ use super::chart::{bar, curve};
 use super::palette::Palette;
 use super::scene::Scene;
 use crate::clipped::clipped;
-use crate::status::{Decision, Diagnosis};
+use crate::status::{Decision, Diagnosis, NamedNode};
 use crate::watch::History;
 
 /// Columns before the bars: title, name and number.
@@ -16,6 +16,9 @@ const BEFORE: usize = 30;
 const AFTER: usize = 15;
 /// What was never more probable within the last minute is not told; nearer ones are not told apart.
 const P_TOLD: f64 = 0.01;
+
+/// What is above the leaves is told if it is so much more probable than each of them.
+const SAYS_MORE: f64 = 0.05;
 
 /// A probability with its name.
 struct Bar<'a> {
@@ -59,14 +62,17 @@ pub fn lines(scene: &Scene<'_>, rows: usize, width: usize) -> Vec<Line<'static>>
     lines
 }
 
-/// The leaves that are, or were, most probable, then what is not known, then nominal.
+/// The leaves that are, or were, most probable, and what is above them where no leaf is as
+/// probable; then what is not known, then nominal.
 fn bars<'a>(diagnosis: &'a Diagnosis, scene: &'a Scene<'_>, room: usize) -> Vec<Bar<'a>> {
     let (histories, palette) = (scene.histories, scene.palette);
     let leaves = diagnosis.nodes.iter().filter(|node| node.is_leaf);
-    let mut leaves: Vec<_> = leaves.collect();
-    leaves.sort_by_key(|node| node.at);
-    let leaves = leaves.into_iter();
-    let mut bars: Vec<Bar<'a>> = leaves
+    let best_p = leaves.map(|node| node.p).fold(0.0, f64::max);
+    let is_drawn = |node: &&NamedNode| node.is_leaf || node.p > best_p + SAYS_MORE;
+    let mut drawn: Vec<&NamedNode> = diagnosis.nodes.iter().filter(is_drawn).collect();
+    drawn.sort_by_key(|node| node.at);
+    let drawn = drawn.into_iter();
+    let mut bars: Vec<Bar<'a>> = drawn
         .map(|node| Bar {
             name: &node.name,
             p: node.p,

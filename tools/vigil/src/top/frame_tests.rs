@@ -131,6 +131,18 @@ const FAULTY: [&str; 5] = [
 ];
 
 #[test]
+fn a_side_is_drawn_where_none_of_its_wheels_is_as_probable() {
+    let rows = rows(&drawn(sample::sided, &SMALL));
+    let beliefs = rows[4..7].iter().map(|row| row[..28].trim());
+    let expected = [
+        "RSS          0.900",
+        "RM_STUCK     0.500",
+        "RF_STUCK     0.400",
+    ];
+    assert_eq!(beliefs.collect::<Vec<_>>(), expected, "{}", rows.join("\n"));
+}
+
+#[test]
 fn more_room_has_longer_bars_and_curves() {
     let rows = rows(&drawn(sample::faulty, &LARGE));
     assert_eq!(rows.len(), 40);

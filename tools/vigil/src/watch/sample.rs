@@ -70,6 +70,17 @@ pub fn faulty(setup: &Setup) -> View {
     view
 }
 
+/// The same, but which wheel it is, is not known.
+pub fn sided(setup: &Setup) -> View {
+    let mut view = faulty(setup);
+    let diagnosis = view.diagnosis.as_mut().unwrap();
+    for (name, p) in [("RSS", 0.9), ("RM_STUCK", 0.5), ("RF_STUCK", 0.4)] {
+        diagnosis.p[setup.tree.index(name).unwrap()] = p;
+    }
+    view.histories.take_diagnosis(diagnosis, NOW_NS);
+    view
+}
+
 /// The same, but its processes are gone and its launcher too: nothing was heard for five seconds.
 pub fn silent(setup: &Setup) -> View {
     let mut view = faulty(setup);
