@@ -1,9 +1,11 @@
 """What the black box has written is read by others' readers: what was measured, believed and done before an alarm."""
 
 import csv
+import datetime
 import json
 import os
 import pathlib
+import select
 import signal
 import subprocess
 import tempfile
@@ -69,6 +71,18 @@ def replayed(path):
     return document, {of["service"]: of for of in document["services"]}
 
 
+def retold(path, *options, **settings):
+    """The lines that `vigil replay` prints of a recording, but for the one that says how fast it was."""
+    command = [BINARIES / "vigil", "replay", path, *options]
+    said = subprocess.run(command, capture_output=True, text=True, timeout=WATCHDOG_S, **settings)
+    assert said.returncode == 0, said
+    return timeless(said.stdout)
+
+
+def timeless(text):
+    return [line for line in text.splitlines() if " times their pace" not in line]
+
+
 class BlackBox(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -87,6 +101,23 @@ class BlackBox(unittest.TestCase):
         """Of its faults, by name."""
         listed = json.loads(vigil("faults", "--json", "--graph", graph.name).stdout)["faults"]
         return {fault["name"]: fault["state"] for fault in listed}
+
+    def assert_told_alike(self, path):
+        """Slowed down, or a line at a time, the same is told."""
+        told = retold(path)
+        for wanted in ["detector: alarm", "identifier: RM_STUCK", "supervisor: compensate"]:
+            self.assertTrue(any(wanted in line for line in told), (wanted, told))
+        self.assertEqual(retold(path, "--speed", "100"), told)
+        self.assertEqual(retold(path, "--step", input="\n" * len(told)), told)
+        command = [BINARIES / "vigil", "replay", path, "--step"]
+        with subprocess.Popen(command, bufsize=0, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as stepped:
+            lines = [stepped.stdout.readline()]
+            self.assertEqual(select.select([stepped.stdout], [], [], 0.5)[0], [], "it waits for Enter")
+            stepped.stdin.write(b"\n")
+            lines.append(stepped.stdout.readline())
+            self.assertEqual(select.select([stepped.stdout], [], [], 0.5)[0], [], "and again")
+            rest, _ = stepped.communicate(b"\n" * len(told), timeout=WATCHDOG_S)
+        self.assertEqual(timeless((b"".join(lines) + rest).decode()), told)
 
     def assert_mended(self, cut):
         """Others' readers want the end of a file, which a cut one lacks."""
@@ -161,6 +192,34 @@ class BlackBox(unittest.TestCase):
             missing = vigil("recordings", "--graph", f"{graph.name}-other", "--config", config)
             self.assertEqual((missing.returncode, "no recordings" in missing.stderr), (1, True), missing)
         self.assertEqual(Flight(path).about["vigil"]["what"], "odd noise")
+
+    def test_reasons_that_overlap_make_one_recording_named_after_the_gravest(self):
+        with Graph("--inject", "stuck:RM@4", "--duration", "60", recordings=self.folder, after_s=8.0) as graph:
+            graph.wait_until_up()
+            wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            said = vigil("snapshot", "odd noise", "--graph", graph.name)
+            self.assertEqual(said.returncode, 0, said)
+            asked_ns = time.time_ns()
+            self.assertNotIn("alarm", vigil("events", "--graph", graph.name).stdout, "it was asked for before")
+            # Whatever else is written, the request is in none of its own.
+            path, *_ = wait_for(lambda: self.recordings("alarm") + self.recordings("request"), "a recording")
+            graph.stop()
+        written = [one for one in self.folder.rglob("*.mcap*") if "-miss" not in one.name]
+        self.assertEqual((written, path), (self.recordings("alarm"), written[0]))
+        flight = Flight(path)
+        about = flight.about["vigil"]
+        self.assertEqual((about["reason"], about["what"]), ("alarm", "alarm, says detector"))
+        causes = [cause.partition(" ") for cause in about["causes"].splitlines()]
+        self.assertEqual(causes[0][2], "alarm, says detector", causes)
+        self.assertEqual(about["when"], causes[0][0])
+        requests = [when for when, _, text in causes if text == "odd noise"]
+        self.assertEqual(len(requests), 1, causes)
+        self.assertLess(requests[0], about["when"], "what came first does not name it")
+        # It holds what was before the request, and what followed the alarm.
+        times = [log_time for log_time, _ in flight.messages["/joint_states"]]
+        self.assertLess(times[0], asked_ns - 1e9)
+        alarm_ns = datetime.datetime.fromisoformat(about["when"]).timestamp() * 1e9
+        self.assertGreater(times[-1] - alarm_ns, 6e9)
 
     def test_a_black_box_that_is_killed_leaves_what_it_had_and_another_goes_on(self):
         with Graph("--duration", "60", recordings=self.folder) as graph:
@@ -253,6 +312,7 @@ class BlackBox(unittest.TestCase):
             self.assertTrue(document["identical"], document)
             for service in ["detector", "identifier", "supervisor"]:
                 self.assertGreater(services[service]["compared"], 0, document)
+        self.assert_told_alike(kept)
 
     def test_a_full_disk_is_said_and_the_black_box_writes_again_when_there_is_room(self):
         mount = ["mount", "-t", "tmpfs", "-o", "size=3m", "vigil-test", self.folder]
@@ -336,9 +396,12 @@ class BlackBox(unittest.TestCase):
             recorder.send_signal(signal.SIGINT)
             said, _ = recorder.communicate(timeout=WATCHDOG_S)
             self.assertEqual((recorder.returncode, part.exists()), (0, False), said)
-            recorder = record("--force")
+            recorder = record("--force", "--json")
             graph.stop()
-            _, said = recorder.communicate(timeout=WATCHDOG_S)
+            printed, said = recorder.communicate(timeout=WATCHDOG_S)
+            document = json.loads(printed)
+            self.assertEqual(problems("record-mcap", document), [])
+            self.assertEqual((document["recording"], document["bytes"]), (str(path), path.stat().st_size))
             self.assertEqual((recorder.returncode, part.exists()), (0, False), said)
             self.assertIn("the graph has ended", said)
         self.assertGreater(len(Flight(path).raw["/vigil/raw/sensor"]), 50)

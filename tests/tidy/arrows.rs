@@ -91,8 +91,8 @@ const TOOLS: &[&str] = &[
 ];
 
 /// The tools that the door may link: it starts the others.
-/// The launcher is for its options.
-const OF_THE_DOOR: &[&str] = &["vigil-terminal", "vigil-launcher"];
+/// The launcher is for its options, the black box for the form of what it says.
+const OF_THE_DOOR: &[&str] = &["vigil-terminal", "vigil-launcher", "vigil-blackbox"];
 
 /// For each shared crate, the crates of the workspace that it may see.
 const ALLOWED: &[(&str, &[&str])] = &[
