@@ -38,8 +38,8 @@ pub(crate) trait DecisionRule: Checkpoint {
     /// Everything begins anew.
     fn reset(&mut self);
 
-    /// Goes on in the run of an earlier supervisor, `believed` is what that told of
-    /// beside the detector's alarm, and is sound.
+    /// Goes on in the run of an earlier supervisor. `believed` is what that told of beside the
+    /// detector's alarm, and is sound.
     fn restore(&mut self, left: &Carryover, believed: Option<&FaultBelief>);
 
     /// True of a diagnosis that can be used.

@@ -110,7 +110,7 @@ impl Hearing {
 
     /// It is not heard, and has not been for some cycles, or was lost before.
     pub(crate) const fn is_lost(&self) -> bool {
-        !self.is_heard() && (self.unheard >= LOST_AFTER || self.was_lost)
+        !self.is_heard() && self.was_lost
     }
 
     /// Another one is waited for: before its first result what was believed stands.
