@@ -8,8 +8,8 @@ use vigil_checkpoint::CheckpointValue;
 const LOST_AFTER: u32 = 3;
 /// Probability of faults with a name from which on they are found: even odds.
 const NAMED: f64 = 0.5;
-/// For how long nobody is called once no identifier knows of an alarm, s. Chosen: longer than one
-/// that is replaced takes to begin and to see how a robot in motion fails.
+/// For how long nobody is called once the identifier that knew of an alarm is lost, s. Chosen:
+/// longer than one that is replaced takes to begin and to see how a robot in motion fails.
 const RETURN_S: f64 = 5.0;
 
 /// Follows whether the identifier knows of an alarm that stands.
@@ -26,7 +26,8 @@ pub(crate) struct Hearing {
     unanswered: u32,
     /// Detections beside an alarm in a row without an identifier that knows of it.
     unheard: u32,
-    /// Time since an identifier is waited for, s, if one is.
+    /// Time since an identifier was heard last, s, if another one is waited for. Another one that
+    /// is heard and lost again is waited for anew; one that is never heard is not.
     waited_s: Option<f64>,
     /// It is waited for since one was lost.
     was_lost: bool,
@@ -46,6 +47,10 @@ impl Hearing {
     /// Takes a sound diagnosis. Another identifier than the one that is waited for has not seen how
     /// the alarm began: it may find a fault with a name, but nothing inexplicable, and no health.
     pub(crate) fn take_diagnosis(&mut self, diagnosis: &FaultBelief) {
+        let is_another = diagnosis.header.epoch != self.epoch;
+        if self.alarm && self.is_heard() && is_another {
+            self.waited_s = Some(0.0);
+        }
         self.unanswered = 0;
         self.epoch = diagnosis.header.epoch;
         let p_named = 1.0 - diagnosis.p[0] - diagnosis.p_unknown;
@@ -66,8 +71,9 @@ impl Hearing {
         // Another one that is heard in its place has not seen all yet.
         let is_another = self.epoch != self.heard_epoch;
         let goes_on = alarm && self.waits() && (is_another || !is_heard);
+        let waited_s = self.waited_s.filter(|_| self.unheard != LOST_AFTER);
         self.waited_s = match goes_on || self.unheard >= LOST_AFTER {
-            true => Some(self.waited_s.unwrap_or(0.0) + passed_s),
+            true => Some(waited_s.unwrap_or(0.0) + passed_s),
             false => None,
         };
         self.was_lost |= self.unheard >= LOST_AFTER;

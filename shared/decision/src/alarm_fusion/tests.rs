@@ -219,16 +219,29 @@ fn an_identifier_that_is_lost_is_waited_for_before_help_is_called() {
     // The same one is waited for no longer than until it is heard again.
     assert_eq!([(); 9].map(|()| next(None)).last(), Some(&(false, false)));
     assert_eq!(next(Some(&heard)), (true, true));
-    // Another one for five seconds from the loss on, heard or not.
+    // Another one for five seconds from the loss on. Heard and lost again, it is waited for anew.
     let mut another = diagnosis(0.0);
     another.header.epoch = 8;
-    for k in 0..498 {
-        let is_lost = !(5..=400).contains(&k);
-        let said = next((!is_lost).then_some(&another));
-        assert!(!said.1 || k < 4, "{k}: {said:?}");
+    for k in 0..400 {
+        let is_there = k >= 300;
+        let said = next(is_there.then_some(&another));
+        assert_eq!((said.0, !said.1 || k < 3), (is_there || k < 2, true), "{k}");
+    }
+    for k in 0..497 {
+        let said = next(None);
+        assert_eq!(said, (k < 2, false), "{k}");
     }
     assert_eq!([(); 20].map(|()| next(None)).last(), Some(&(false, true)));
     assert_eq!(next(Some(&another)), (true, true));
+    // So it is if yet another one answers before it is missed.
+    another.header.epoch = 9;
+    for k in 0..490 {
+        assert_eq!(next(Some(&another)), (true, false), "{k}");
+    }
+    assert_eq!(
+        [(); 20].map(|()| next(Some(&another))).last(),
+        Some(&(true, true))
+    );
     // What is not sound is no answer.
     let mut fusion = AlarmFusion::new(0.5);
     for k in 1..20 {

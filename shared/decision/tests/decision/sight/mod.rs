@@ -349,6 +349,39 @@ fn a_supervisor_that_is_replaced_beside_an_alarm_stands_until_it_hears_and_calls
 }
 
 #[test]
+fn an_identifier_that_is_replaced_again_is_waited_for_as_long_as_the_first() {
+    let mut stages = Stages::new();
+    stages.named("RM_STUCK");
+    stages.cycles(100);
+    // Supervisor and identifier are replaced, and some seconds later detector and identifier.
+    let told = stages.diagnosis;
+    let left = stages.world.supervisor.carryover();
+    stages.world = World::new();
+    stages.world.supervisor.restore(&left, Some(&told));
+    stages.diagnosis.header.epoch = 2;
+    stages.cycles(460);
+    assert_eq!(stages.world.kind(), RecoveryKind::Compensate);
+    stages.replaced();
+    stages.detection.header.epoch = 9;
+    (stages.detection.alarm, stages.detection.alarm_t_capture_ns) = (0, 0);
+    stages.detection.readiness = Readiness::Arming as u32;
+    for cycle in 0..400 {
+        stages.cycles(1);
+        assert_eq!(stages.world.kind(), RecoveryKind::Compensate, "{cycle}");
+        assert_eq!(stages.world.supervisor.latched(), None);
+    }
+    // The new detector's alarm is inexplicable to the new identifier at first.
+    (stages.detection.alarm, stages.detection.alarm_t_capture_ns) = (1, 9);
+    stages.p_fault(0.99);
+    stages.cycles(50);
+    assert_eq!(stages.world.kind(), RecoveryKind::Compensate);
+    stages.named("RM_STUCK");
+    stages.cycles(600);
+    assert_eq!(stages.world.kind(), RecoveryKind::Compensate);
+    assert_eq!(stages.world.supervisor.latched(), None);
+}
+
+#[test]
 fn what_was_told_is_believed_until_the_new_identifier_is_heard() {
     let mut stages = Stages::new();
     stages.named("RM_STUCK");
