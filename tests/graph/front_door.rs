@@ -6,7 +6,9 @@ use serde_json::Value;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Domain, signal};
 
-use crate::harness::{RunningGraph, binary, eventually, root, shared_machine, unique, wait};
+use crate::harness::{
+    RunningGraph, binary, config_with, eventually, root, shared_machine, unique, wait,
+};
 use crate::killing::kill;
 
 fn vigil(words: &[&str]) -> Output {
@@ -113,6 +115,10 @@ fn a_graph_whose_launcher_was_killed_is_listed_adopted_and_goes_on() {
     let name = unique("adopted");
     let inject = ["--inject", "encoder:LF:zero@1", "--inject", "stuck:RM@500"];
     let graph = orphan(&name, &inject);
+    let told = err(&vigil(&["status", "--graph", &unique("no-such")]));
+    let running = told.split_once("; there run: ").unwrap().1;
+    let mut running = running.trim().split(", ");
+    assert!(running.any(|other| other == name), "{told}");
     let text = vigil(&["list"]);
     assert_eq!(text.status.code(), Some(1));
     let text = String::from_utf8_lossy(&text.stdout).into_owned();
@@ -257,6 +263,51 @@ fn a_name_that_does_not_run_is_said_and_leaves_nothing_behind() {
     let runtime = folder.folder().parent().unwrap();
     assert!(!runtime.join(&name).exists());
     std::fs::remove_dir_all(folder.folder()).unwrap();
+}
+
+#[test]
+fn a_value_that_is_wrong_is_blamed_on_the_option_that_gave_it() {
+    for command in ["check", "run", "config", "graph"] {
+        let output = vigil(&[command, "--rate", "1e9"]);
+        assert_eq!(output.status.code(), Some(2), "{command}");
+        let expected = "--rate: 1000000000 is out of range: allowed is 1 to 10000\n";
+        assert_eq!(err(&output), expected, "{command}");
+    }
+    // The file is to blame for what it says itself.
+    let folder = std::env::temp_dir().join(unique("blamed"));
+    let config = config_with(&folder, |text| {
+        text.replace("rate_hz = 100.0", "rate_hz = 1e9")
+    });
+    let config = config.to_str().unwrap();
+    let output = vigil(&["check", "--config", config]);
+    let told = err(&output);
+    assert!(
+        told.starts_with(config) && told.contains("rate_hz"),
+        "{told}"
+    );
+    let output = vigil(&["check", "--config", config, "--rate", "50"]);
+    assert!(output.status.success(), "{}", err(&output));
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn options_that_mean_nothing_to_a_command_are_not_shown_and_taken_all_the_same() {
+    for (command, hidden, shown) in [
+        ("check-publisher", "--speed", "--rate"),
+        ("record", "--identifier", "--graph"),
+        ("graph", "--seed", "--replay"),
+    ] {
+        let output = vigil(&[command, "--help"]);
+        let help = String::from_utf8(output.stdout).unwrap();
+        let has = |option: &str| help.contains(&format!("{option} <"));
+        assert_eq!(
+            (has(hidden), has(shown)),
+            (false, true),
+            "{command}: {help}"
+        );
+    }
+    let output = vigil(&["graph", "--seed", "3"]);
+    assert!(output.status.success(), "{}", err(&output));
 }
 
 #[test]

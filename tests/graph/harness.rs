@@ -9,7 +9,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use vigil_blocks::{Block, Health};
+use vigil_blocks::{Action, Block, Health, RecoveryKind};
 use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Graph, Receiver, Topic};
@@ -239,6 +239,41 @@ impl HealthWatch {
     pub fn all_running(&mut self) -> bool {
         let running = vigil_blocks::ServiceState::Running as u32;
         self.poll().values().filter(|h| h.state == running).count() == ServiceName::ALL.len()
+    }
+}
+
+/// What the supervisor does.
+pub struct ActionWatch {
+    receiver: Box<dyn Receiver<Action>>,
+    last: Option<RecoveryKind>,
+}
+
+impl ActionWatch {
+    pub fn new(graph: &Graph) -> Self {
+        Self {
+            receiver: graph.receiver(Topic::Action).unwrap(),
+            last: None,
+        }
+    }
+
+    /// Waits until an action of this kind has stood for `lasting`. Changes are printed, in case
+    /// that never happens.
+    pub fn wait_for(&mut self, kind: RecoveryKind, lasting: Duration) {
+        let mut since_ns = None;
+        eventually(&format!("{kind:?} for {lasting:?}"), || {
+            let mut is_done = None;
+            drain(self.receiver.as_mut(), |action| {
+                let (now_ns, is_kind) = (action.header.t_publish_ns, action.kind == kind as u32);
+                let last = RecoveryKind::from_repr(action.kind);
+                if std::mem::replace(&mut self.last, last) != last {
+                    println!("{:.2} s: {last:?}", now_ns as f64 * 1e-9);
+                }
+                since_ns = is_kind.then(|| since_ns.unwrap_or(now_ns));
+                let lasted = |since_ns| Duration::from_nanos(now_ns - since_ns) >= lasting;
+                is_done = since_ns.is_some_and(lasted).then_some(());
+            });
+            is_done
+        });
     }
 }
 

@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 use std::process::Command;
+use std::time::Duration;
 
-use vigil_blocks::{Action, FaultBelief, RecoveryKind};
+use vigil_blocks::{FaultBelief, RecoveryKind};
 use vigil_cycle::Topic;
 
 use crate::harness::{
-    HealthWatch, ModeWatch, RunningGraph, Summary, config_with, drain, eventually, machine, unique,
+    ActionWatch, HealthWatch, ModeWatch, RunningGraph, Summary, config_with, drain, eventually,
+    machine, unique,
 };
 
 #[test]
@@ -100,33 +102,13 @@ fn replaced_beside_a_stuck_wheel(config: PathBuf, name: &str, deaths: &[&[&str]]
     let mut graph = RunningGraph::start_with(config, name, &options);
     let observed = graph.observe();
     let mut health = HealthWatch::new(&observed);
-    let mut actions = observed.receiver::<Action>(Topic::Action).unwrap();
-    // Told if the test fails.
-    let mut last = None;
-    // The robot drives: a detector that was replaced arms, and raises its own alarm.
-    let mut compensates = |for_ns: u64| {
-        let mut since_ns = None;
-        eventually("the stuck wheel is compensated", || {
-            let mut is_done = None;
-            drain(actions.as_mut(), |action| {
-                let now_ns = action.header.t_publish_ns;
-                let kind = RecoveryKind::from_repr(action.kind);
-                if last.replace(kind) != Some(kind) {
-                    println!("{:.2} s: {kind:?}", now_ns as f64 * 1e-9);
-                }
-                let is_compensated = action.kind == RecoveryKind::Compensate as u32;
-                since_ns = is_compensated.then(|| since_ns.unwrap_or(now_ns));
-                let passed_ns = since_ns.map_or(0, |since_ns| now_ns - since_ns);
-                is_done = (passed_ns > for_ns).then_some(());
-            });
-            is_done
-        });
-    };
-    compensates(500_000_000);
+    let mut actions = ActionWatch::new(&observed);
+    actions.wait_for(RecoveryKind::Compensate, Duration::from_millis(500));
     for services in deaths {
         println!("{services:?} die");
         replace(&mut health, services);
-        compensates(4_000_000_000);
+        // The robot drives: a detector that was replaced arms, and raises its own alarm.
+        actions.wait_for(RecoveryKind::Compensate, Duration::from_secs(4));
     }
     graph.interrupt();
     let summary = graph.finish();
@@ -148,24 +130,14 @@ fn a_call_for_help_stands_while_services_are_replaced_and_is_told_once() {
     let mut graph = RunningGraph::start("called", &[&["--duration", "90"][..], &faults].concat());
     let observed = graph.observe();
     let mut health = HealthWatch::new(&observed);
-    let mut actions = observed.receiver::<Action>(Topic::Action).unwrap();
-    let mut calls = || {
-        eventually("help is called", || {
-            let mut calls = None;
-            drain(actions.as_mut(), |action| {
-                let is_called = action.kind == RecoveryKind::CallForHelp as u32;
-                calls = is_called.then_some(());
-            });
-            calls
-        });
-    };
-    calls();
+    let mut actions = ActionWatch::new(&observed);
+    actions.wait_for(RecoveryKind::CallForHelp, Duration::ZERO);
     for services in [
         &["supervisor"][..],
         &["supervisor", "detector", "identifier"],
     ] {
         replace(&mut health, services);
-        calls();
+        actions.wait_for(RecoveryKind::CallForHelp, Duration::ZERO);
     }
     graph.interrupt();
     let summary = graph.finish();
@@ -254,19 +226,9 @@ fn a_rover_with_a_stuck_wheel_reaches_its_goal_while_services_are_replaced() {
     let mut graph = RunningGraph::start_with(config, "corridor", &options);
     let observed = graph.observe();
     let mut health = HealthWatch::new(&observed);
-    let mut actions = observed.receiver::<Action>(Topic::Action).unwrap();
-    let mut compensates = || {
-        eventually("the stuck wheel is compensated", || {
-            let mut is_done = None;
-            drain(actions.as_mut(), |action| {
-                let is_compensated = action.kind == RecoveryKind::Compensate as u32;
-                is_done = is_compensated.then_some(());
-            });
-            is_done
-        });
-    };
+    let mut actions = ActionWatch::new(&observed);
     for services in [&["supervisor"][..], &["detector"], &["identifier"]] {
-        compensates();
+        actions.wait_for(RecoveryKind::Compensate, Duration::ZERO);
         replace(&mut health, services);
     }
     let summary = graph.finish();

@@ -97,6 +97,17 @@ class Graph:
             time.sleep(0.02)
         return address
 
+    def told(self, kind):
+        """The services of which it has told events of a kind so far, and what it said of each."""
+        told = vigil("events", "--json", "--graph", self.name).stdout.splitlines()
+        return [(event["service"], event["what"]) for event in map(json.loads, told) if event["event"] == kind]
+
+    def wait_until_armed(self):
+        """Until its robot drives, and is watched; its folder."""
+        folder = self.wait_until_up()
+        wait_for(lambda: self.told("armed"), "a drive")
+        return folder
+
     def pid(self, service):
         """The process of a service."""
         listed = json.loads(vigil("list", "--json").stdout)["graphs"]

@@ -77,16 +77,14 @@ class Faults(unittest.TestCase):
 
     def told(self, graph):
         """How often it was told that the fault is active."""
-        said = vigil("events", "--json", "--graph", graph.name).stdout.splitlines()
-        return [event["what"] for event in map(json.loads, said)].count(f"{FAULT} is active")
+        return [what for _, what in graph.told("fault")].count(f"{FAULT} is active")
 
     def wait_for_fault(self, graph):
         wait_for(lambda: self.told(graph), "the fault")
 
     def test_a_fault_is_followed_from_its_beginning_to_the_end_of_the_graph(self):
         with Graph("--inject", "stuck:RM@4", "--duration", "60") as graph:
-            graph.wait_until_up()
-            wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            graph.wait_until_armed()
             words = ["faults", "--follow", "--graph", graph.name]
             with Follower(*words, "--json") as documents, Follower(*words) as text:
                 wait_for(lambda: documents.lines and text.lines, "the first list")

@@ -195,12 +195,11 @@ class BlackBox(unittest.TestCase):
 
     def test_reasons_that_overlap_make_one_recording_named_after_the_gravest(self):
         with Graph("--inject", "stuck:RM@4", "--duration", "60", recordings=self.folder, after_s=8.0) as graph:
-            graph.wait_until_up()
-            wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            graph.wait_until_armed()
             said = vigil("snapshot", "odd noise", "--graph", graph.name)
             self.assertEqual(said.returncode, 0, said)
             asked_ns = time.time_ns()
-            self.assertNotIn("alarm", vigil("events", "--graph", graph.name).stdout, "it was asked for before")
+            self.assertEqual(graph.told("alarm"), [], "it was asked for before")
             # Whatever else is written, the request is in none of its own.
             path, *_ = wait_for(lambda: self.recordings("alarm") + self.recordings("request"), "a recording")
             graph.stop()
@@ -225,15 +224,14 @@ class BlackBox(unittest.TestCase):
         with Graph("--duration", "60", recordings=self.folder) as graph:
             graph.wait_until_up()
             first = wait_for(lambda: self.blackbox(graph), "a black box")
-            ring = graph.wait_until_up() / "memory/ring"
-            wait_for(lambda: ring.exists() and "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            ring = graph.wait_until_armed() / "memory/ring"
+            wait_for(ring.exists, "its memory")
             killed_ns = time.time_ns()
             os.kill(first, signal.SIGKILL)
             second = wait_for(lambda: self.blackbox(graph) not in (None, first) and self.blackbox(graph), "another")
             self.assertNotEqual(second, first)
             path, *_ = wait_for(lambda: self.recordings("crash"), "a recording")
-            told = vigil("events", "--json", "--graph", graph.name).stdout.splitlines()
-            restarted = [event["service"] for event in map(json.loads, told) if event["event"] == "restarted"]
+            restarted = [service for service, _ in graph.told("restarted")]
             self.assertEqual(restarted, ["blackbox"])
             summary = graph.stop()
         self.assertEqual([event["service"] for event in summary["events"] if event["event"] == "restarted"], restarted)
@@ -245,9 +243,9 @@ class BlackBox(unittest.TestCase):
 
     def test_what_it_kept_is_written_when_a_graph_without_launcher_is_stopped(self):
         with Graph("--duration", "60", recordings=self.folder) as graph:
-            ring = graph.wait_until_up() / "memory/ring"
+            ring = graph.wait_until_armed() / "memory/ring"
             found = wait_for(lambda: self.blackbox(graph), "a black box")
-            wait_for(lambda: ring.exists() and "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            wait_for(ring.exists, "its memory")
             second = [BINARIES / "vigil-blackbox", "--graph", graph.name]
             second = subprocess.run(second, capture_output=True, text=True, timeout=WATCHDOG_S, check=False)
             self.assertEqual((second.returncode, "lives" in second.stderr), (1, True), second)
@@ -265,8 +263,7 @@ class BlackBox(unittest.TestCase):
 
     def test_a_service_that_is_killed_is_a_crash(self):
         with Graph("--duration", "60", recordings=self.folder, before_s=30.0) as graph:
-            graph.wait_until_up()
-            wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            graph.wait_until_armed()
             os.kill(graph.pid("detector"), signal.SIGKILL)
             path, *_ = wait_for(lambda: self.recordings("crash"), "a recording")
             graph.stop()
@@ -283,8 +280,7 @@ class BlackBox(unittest.TestCase):
     def test_a_recording_of_any_length_is_computed_again_to_the_last_bit(self):
         path = self.folder / "drive.mcap"
         with Graph("--inject", "stuck:RM@14", "--duration", "60", recordings=self.folder, before_s=30.0) as graph:
-            graph.wait_until_up()
-            wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            graph.wait_until_armed()
             command = [BINARIES / "vigil", "record", path, "--graph", graph.name, "--duration", "25"]
             with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as recorder:
                 # The order is computed again, too, whether or not its block was recorded.
@@ -320,8 +316,7 @@ class BlackBox(unittest.TestCase):
             self.skipTest("mounting a small disk needs root")
         self.addCleanup(subprocess.run, ["umount", self.folder], check=True)
         with Graph("--duration", "60", recordings=self.folder) as graph:
-            graph.wait_until_up()
-            wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            graph.wait_until_armed()
             first = wait_for(lambda: self.blackbox(graph), "a black box")
             time.sleep(3)
             vigil("snapshot", "too much", "--graph", graph.name)
@@ -345,9 +340,8 @@ class BlackBox(unittest.TestCase):
         self.addCleanup(subprocess.run, ["umount", self.folder], check=True)
         killed = []
         with Graph("--duration", "60", recordings=self.folder) as graph:
-            folder = graph.wait_until_up()
+            folder = graph.wait_until_armed()
             unwritten = lambda: sorted(path.name for path in folder.glob("unwritten-*"))
-            wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
             for count in [1, 2]:
                 found = wait_for(lambda: self.blackbox(graph) not in killed and self.blackbox(graph), "a black box")
                 wait_for(lambda: (folder / "memory/ring").exists() and len(unwritten()) == count - 1, "its memory")
@@ -376,8 +370,7 @@ class BlackBox(unittest.TestCase):
     def test_a_recording_ends_with_a_signal_or_its_graph(self):
         path = self.folder / "drive.mcap"
         with Graph("--duration", "60") as graph:
-            graph.wait_until_up()
-            wait_for(lambda: "armed" in vigil("events", "--graph", graph.name).stdout, "a drive")
+            graph.wait_until_armed()
 
             def record(*options):
                 command = [BINARIES / "vigil", "record", path, "--graph", graph.name, *options]

@@ -49,17 +49,11 @@ class Orphans(unittest.TestCase):
         self.assertEqual(problems("list", document), [])
         return next((of for of in document["graphs"] if of["name"] == graph.name), None)
 
-    def happened(self, graph, kind):
-        """The services of which the graph has told events of a kind."""
-        told = vigil("events", "--json", "--graph", graph.name).stdout.splitlines()
-        return [event["service"] for event in map(json.loads, told) if event["event"] == kind]
-
     def orphan(self, graph):
         """Kills the launcher of a graph once its black box keeps what it does; its folder, and what is listed then."""
         # Whatever fails, nothing goes on after the test.
         self.addCleanup(lambda: self.listed(graph) and vigil("stop", "--graph", graph.name))
-        folder = graph.wait_until_up()
-        wait_for(lambda: self.happened(graph, "armed"), "a drive")
+        folder = graph.wait_until_armed()
         wait_for(lambda: self.listed(graph)["blackbox"] and (folder / "memory/ring").exists(), "its black box")
         before = self.listed(graph)
         self.assertEqual(before["launcher"], graph.launcher.pid)
@@ -110,7 +104,7 @@ class Orphans(unittest.TestCase):
             self.assertTrue(lives(again["blackbox"]))
             self.assertEqual(again["services"], orphan["services"])
             wait_for(lambda: list(self.recordings.glob("*/*-crash.mcap")), "what the killed one kept")
-            self.assertEqual(self.happened(graph, "restarted"), ["blackbox"])
+            self.assertEqual([service for service, _ in graph.told("restarted")], ["blackbox"])
 
             said = vigil("stop", "--graph", graph.name)
             self.assertEqual(said.returncode, 0, said.stderr)

@@ -265,6 +265,8 @@ class CheckPublisher(unittest.TestCase):
                 return "vigil.SensorFrame.v1.0123456789abcdef"
 
         name = f"py{os.getpid()}-other"
+        # Of a process that goes on, iceoryx2 leaves one file.
+        self.addCleanup(lambda: [left.unlink() for left in pathlib.Path("/dev/shm").glob(f"vigil_{name}_*")])
         # Where a graph of this name would be: told when nobody publishes.
         (none,) = [f for f in self.check(name, "--source", "external")["findings"] if f["check"] == "frames"]
         config = iceoryx2.config.default()

@@ -136,3 +136,34 @@ pub fn read_back(core: usize) -> Placement {
         memory_locked: false,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cores that the calling thread may run on.
+    fn cores() -> Vec<usize> {
+        let ids = core_affinity::get_core_ids().unwrap();
+        ids.into_iter().map(|it| it.id).collect()
+    }
+
+    #[test]
+    fn who_keeps_off_cores_runs_on_the_others_if_there_are_any_and_behind_everybody_else() {
+        let all = cores();
+        let observer = std::thread::spawn(move || {
+            keep_off(&[all[0], usize::MAX]);
+            let others = cores();
+            match all.len() {
+                1 => assert_eq!(others, all),
+                _ => assert_eq!(others, all[1..]),
+            }
+            keep_off(&all);
+            assert_eq!(cores(), others, "there are no others");
+            // SAFETY: a plain system call on the calling thread.
+            #[allow(unsafe_code)]
+            let nice = unsafe { libc::getpriority(libc::PRIO_PROCESS, 0) };
+            assert_eq!(nice, 15);
+        });
+        observer.join().unwrap();
+    }
+}

@@ -2,12 +2,11 @@
 
 use vigil_blocks::FaultBelief;
 use vigil_checkpoint::CheckpointValue;
+use vigil_robot::detector_alarm::are_named;
 
 /// Detections in a row without a diagnosis after which the identifier counts as lost, as every
 /// input of a service does (`vigil_cycle`).
 const LOST_AFTER: u32 = 3;
-/// Probability of faults with a name from which on they are found: even odds.
-const NAMED: f64 = 0.5;
 /// For how long nobody is called once the identifier that knew of an alarm is lost, s. Chosen:
 /// longer than one that is replaced takes to begin and to see how a robot in motion fails.
 const RETURN_S: f64 = 5.0;
@@ -53,8 +52,8 @@ impl Hearing {
         }
         self.unanswered = 0;
         self.epoch = diagnosis.header.epoch;
-        let p_named = 1.0 - diagnosis.p[0] - diagnosis.p_unknown;
-        let may_tell = p_named > NAMED || !self.waits() || self.epoch == self.heard_epoch;
+        let are_named = are_named(diagnosis.p[0], diagnosis.p_unknown);
+        let may_tell = are_named || !self.waits() || self.epoch == self.heard_epoch;
         self.knows = diagnosis.identifying != 0 && may_tell;
     }
 

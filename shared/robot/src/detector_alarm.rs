@@ -8,6 +8,13 @@ use crate::alarm::Lull;
 /// Motion between two beliefs counts for at most this long, s. Chosen: ten observations of 50 ms.
 const STEP_MAX_S: f64 = 0.5;
 
+/// True if faults with a name are more probable than not. A reader of an alarm that has not seen how
+/// it began tells of nothing else, or hears nothing else, at first.
+#[must_use]
+pub const fn are_named(p_nominal: f64, p_unknown: f64) -> bool {
+    1.0 - p_nominal - p_unknown > 0.5
+}
+
 /// What the detector says of a fault. One that has just begun, or whose frames come from another
 /// publisher than before, knows nothing of an alarm that stood before: that alarm is held until the
 /// detector has raised its own, or its log-odds have been as low for as long as those that end an
@@ -143,6 +150,13 @@ mod tests {
     use super::*;
 
     const LOW: f64 = -9.0;
+
+    #[test]
+    fn faults_are_named_beyond_even_odds() {
+        assert!(are_named(0.1, 0.3) && are_named(0.0, 0.0));
+        assert!(!are_named(0.25, 0.25) && !are_named(0.9, 0.1));
+        assert!(!are_named(f64::NAN, 0.0));
+    }
 
     /// A belief of the detector that began at `epoch`, after so many steps of 100 ms.
     fn belief(epoch: u64, step: u64, alarm: bool, readiness: Readiness) -> DetectionBelief {

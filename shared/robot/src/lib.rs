@@ -12,7 +12,7 @@ pub mod context_table;
 mod counter_steering;
 pub mod declared;
 pub mod description;
-mod detector_alarm;
+pub mod detector_alarm;
 pub mod disturbance;
 pub mod disturbance_kind;
 pub mod fault;

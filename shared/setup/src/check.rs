@@ -17,8 +17,9 @@ mod navigation;
 mod planning;
 mod supervisor;
 
-/// Largest length of a graph's name: it is part of shared-memory and socket names.
-pub const NAME_LENGTH_MAX: usize = 24;
+/// Largest length of a graph's name. It stands twice in the paths of sockets, and more have no room
+/// below `/run/vigil`; a longer runtime folder leaves less (`vigil_cycle::Domain`).
+pub const NAME_LENGTH_MAX: usize = 21;
 
 /// Checks a graph file; `report` gets the key and a message for each problem.
 pub(crate) fn graph(

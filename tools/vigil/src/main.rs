@@ -66,12 +66,12 @@ enum Command {
     Recordings(recordings::Args),
     Ros2(ros2::Args),
     Check(check::Args),
-    #[command(mut_args(only_of_the_border))]
+    #[command(mut_args(hide(NOTHING_TO_PUBLISHERS)))]
     CheckPublisher(check_publisher::Args),
     Config(config::Args),
-    #[command(mut_args(only_of_a_drawing))]
+    #[command(mut_args(hide(NOTHING_TO_A_DRAWING)))]
     Graph(graph::Args),
-    #[command(mut_args(only_of_the_border))]
+    #[command(mut_args(hide(NOTHING_TO_PUBLISHERS)))]
     Record(record::Args),
     #[command(name = "channels")]
     PrintChannels(print_channels::Args),
@@ -85,18 +85,17 @@ enum Command {
     Laboratory(Vec<OsString>),
 }
 
-/// Options of a graph that mean nothing to publishers are not shown there.
-fn only_of_the_border(arg: Arg) -> Arg {
-    let id = arg.get_id().as_str();
-    let is_other = ["seed", "identifier", "replay", "runs", "speed"].contains(&id);
-    arg.hide(is_other)
-}
+/// Options of a graph that say nothing of the frames that a publisher sends.
+const NOTHING_TO_PUBLISHERS: &[&str] = &["seed", "identifier", "replay", "runs", "speed"];
+/// Options of a graph that change nothing in a drawing of it.
+const NOTHING_TO_A_DRAWING: &[&str] = &["seed", "identifier", "runs", "speed"];
 
-/// Options of a graph that change nothing in its drawing are not shown there.
-fn only_of_a_drawing(arg: Arg) -> Arg {
-    let id = arg.get_id().as_str();
-    let is_other = ["seed", "identifier", "runs", "speed"].contains(&id);
-    arg.hide(is_other)
+/// Shows a command's options, but for these.
+fn hide(ids: &'static [&'static str]) -> impl Fn(Arg) -> Arg {
+    move |arg| {
+        let is_hidden = ids.contains(&arg.get_id().as_str());
+        arg.hide(is_hidden)
+    }
 }
 
 /// Becomes the command of these words, asked for its help.

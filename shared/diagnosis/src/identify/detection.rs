@@ -19,9 +19,6 @@ pub struct Detection {
     sight: OnsetSight,
 }
 
-/// Probability of faults with a name from which on who has seen little is heard: even odds.
-const NAMED: f64 = 0.5;
-
 impl Detection {
     /// Goes on in this run, with nothing known but an alarm that stands in it.
     pub fn begin_run(&mut self, run_id: u64) {
@@ -72,11 +69,11 @@ impl Detection {
         self.sight.pass(moved_s);
     }
 
-    /// True if what was found is to be told, in which faults with a name have `p_named`. Who has
-    /// not seen how an alarm began finds the robot neither healthy nor inexplicable before it has
-    /// seen enough.
-    pub fn may_tell(&self, p_named: f64) -> bool {
-        p_named > NAMED || !self.sight.is_short()
+    /// True if what was found is to be told, faults with a name (`are_named`) or anything else. Who
+    /// has not seen how an alarm began finds the robot neither healthy nor inexplicable before it
+    /// has seen enough.
+    pub fn may_tell(&self, are_named: bool) -> bool {
+        are_named || !self.sight.is_short()
     }
 }
 
@@ -147,7 +144,7 @@ mod tests {
     fn who_begins_beside_an_alarm_tells_of_faults_alone_before_it_has_seen_enough() {
         let map = map();
         let mut found = Detection::default();
-        assert!(found.may_tell(0.0));
+        assert!(found.may_tell(false));
         let belief = DetectionBelief {
             alarm: 1,
             ..DetectionBelief::default()
@@ -155,8 +152,8 @@ mod tests {
         for (moved_s, may) in [(0.0, false), (2.5, false), (0.5, true)] {
             found.take(&belief, &map);
             found.pass(moved_s);
-            assert_eq!(found.may_tell(0.5), may);
-            assert!(found.may_tell(0.51), "a fault is told at once");
+            assert_eq!(found.may_tell(false), may);
+            assert!(found.may_tell(true), "a fault is told at once");
         }
     }
 

@@ -6,8 +6,8 @@ use vigil_blocks::{
     SensorFrame,
 };
 use vigil_checkpoint::Checkpoint;
-use vigil_robot::FaultPrior;
 use vigil_robot::learned::{Healthy, Observer, motion_modes};
+use vigil_robot::{FaultPrior, detector_alarm::are_named};
 
 use crate::identify::channel_evidence::{ChannelEvidence, Drive};
 use crate::identify::detection::Detection;
@@ -326,7 +326,7 @@ impl Identifier {
         }
         self.phase = Phase::Identifying(start + 1);
         self.sizes = NodeSizes::default();
-        self.is_heard = self.detection.may_tell(0.0);
+        self.is_heard = self.detection.may_tell(false);
         // What was unknown so far is any of the faults, by their priors.
         self.predicted = self.predicted.divided(&self.leaves, self.p_unknown);
     }
@@ -364,8 +364,8 @@ impl Identifier {
         let fusion = self.further.as_ref().map(|further| further.fusion());
         self.engine
             .posterior(&self.leaves, fusion.as_ref(), &mut self.posterior);
-        let p_named = 1.0 - self.posterior.nodes[0] - self.posterior.unknown;
-        self.is_heard = self.detection.may_tell(p_named);
+        let are_named = are_named(self.posterior.nodes[0], self.posterior.unknown);
+        self.is_heard = self.detection.may_tell(are_named);
         self.sizes = self.engine.sizes(&self.leaves, &self.posterior);
         if self.is_heard {
             self.explain(next, next + taken);

@@ -35,32 +35,38 @@ pub struct Args {
     /// Policies, separated by commas.
     #[arg(
         long,
+        value_name = "LIST",
         value_delimiter = ',',
         default_value = "mls,av,qmdp,fib,dm-mls,dm-av,dm-qmdp,\
         adm-mls,adm-av,adm-qmdp,random"
     )]
     policies: Vec<String>,
     /// Thresholds K of dual control, separated by commas, each 0 to 1.
-    #[arg(long, value_delimiter = ',', default_value = "0.5")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "0.5"
+    )]
     thresholds: Vec<f64>,
     /// Missions of each policy, 2 to 10000000.
-    #[arg(long, default_value_t = 1000, value_parser = count(2))]
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = count(2))]
     episodes: u64,
     /// Seed of the missions. Each command draws its own numbers from a seed.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Greatest number of steps of a mission. It ends earlier once the discount is below 1e-4.
-    #[arg(long, default_value_t = 2000, value_parser = count(1))]
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = count(1))]
     steps_max: u64,
     /// Actions that end a mission. There is no regret then, as bounds hold for endless missions.
-    #[arg(long, value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
     ends: Vec<String>,
     /// Actions that dual control may take to gain information [default: all that do not end a
     /// mission].
-    #[arg(long, value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
     information_actions: Vec<String>,
     /// Steps without falling entropy after which dual control gathers no more; 0: never.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0)]
     stall_guard_steps: u32,
     /// Entropy that is compared with K [default: state for dm-X, action for adm-X].
     #[arg(long)]
@@ -70,11 +76,11 @@ pub struct Args {
     model_error: Option<PathBuf>,
     /// Policy with which each other one is compared in pairs [default: the first escalation, else
     /// the first policy].
-    #[arg(long)]
+    #[arg(long, value_name = "POLICY")]
     against: Option<String>,
     /// Upper bound of the value at the start belief [default: the lower of the fast informed bound
     /// and the point-based solver's after a fixed number of steps, about half a second].
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     upper: Option<f64>,
     /// Policy file for `point-based`, as `vigil pomdp solve FILE --out POLICY` writes it; plans
     /// that `despot` may end with.

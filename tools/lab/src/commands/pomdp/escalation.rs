@@ -10,13 +10,23 @@ use vigil_terminal::CommandError;
 #[derive(Debug, clap::Args)]
 pub struct EscalationArgs {
     /// Action of escalation-N while no symptom is observed.
-    #[arg(long, default_value = navigation::ACTIONS[0])]
+    #[arg(long, value_name = "ACTION", default_value = navigation::ACTIONS[0])]
     usual: String,
     /// Actions that escalation-N takes one after another while symptoms last.
-    #[arg(long, value_delimiter = ',', default_value = "MA,GO,NP,RL,SH,GU")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "MA,GO,NP,RL,SH,GU"
+    )]
     ladder: Vec<String>,
     /// Observations that escalation-N takes for no symptom.
-    #[arg(long, value_delimiter = ',', default_value = "none,BO,ALT")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "none,BO,ALT"
+    )]
     quiet: Vec<String>,
 }
 

@@ -31,33 +31,33 @@ pub struct Args {
     /// The model made by hand (.pomdp or .pomdpx).
     file: PathBuf,
     /// Recorded missions, as `vigil pomdp simulate` writes them.
-    #[arg(long)]
+    #[arg(long, value_name = "FILE")]
     missions: PathBuf,
     /// Where to write the learned model.
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
     /// Weight of the model made by hand: the number of visits that each of its rows counts as.
     /// 0 learns from the missions alone.
-    #[arg(long, default_value_t = 50.0)]
+    #[arg(long, value_name = "K", default_value_t = 50.0)]
     prior_strength: f64,
     /// Greatest number of iterations of each start.
-    #[arg(long, default_value_t = 200, value_parser = count(1))]
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = count(1))]
     iterations: u64,
     /// Number of starts. The first is FILE, the others are drawn around it; the best result counts.
-    #[arg(long, default_value_t = 1, value_parser = count(1))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = count(1))]
     starts: u64,
     /// Write the model even if nothing can check it: the missions hold no rewards, and --world is
     /// not given.
     #[arg(long)]
     unchecked: bool,
     /// Seed of drawn starts and simulated missions. Each command draws its own numbers from a seed.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Policy whose mean reward is predicted: mls, av, qmdp or fib.
-    #[arg(long, default_value = "fib")]
+    #[arg(long, value_name = "POLICY", default_value = "fib")]
     policy: String,
     /// Simulated missions for the prediction.
-    #[arg(long, default_value_t = 1000, value_parser = count(2))]
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = count(2))]
     episodes: u64,
     /// Model that plays the world, in which the learned model's policy is measured.
     #[arg(long, value_name = "OTHER")]

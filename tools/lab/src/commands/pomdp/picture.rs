@@ -36,13 +36,13 @@ pub struct Args {
     #[arg(long, group = "what", value_name = "A:O,A:O,...")]
     belief: Option<String>,
     /// The policy: mls, av, qmdp, fib, dm-X or adm-X (K = 0.5), or a file of `vigil pomdp solve`.
-    #[arg(long, default_value = "fib")]
+    #[arg(long, value_name = "POLICY", default_value = "fib")]
     policy: String,
     /// Greatest number of nodes of a graph, 1 to 60.
-    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=60))]
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=60))]
     nodes: u64,
     /// Greatest sum of differences between beliefs that share a node of a graph, 0 to 2.
-    #[arg(long, default_value_t = 0.25)]
+    #[arg(long, value_name = "X", default_value_t = 0.25)]
     tolerance: f64,
     /// Where to write the drawing (SVG or, for a graph, DOT).
     #[arg(short, long, value_name = "FILE")]

@@ -25,19 +25,19 @@ pub struct Args {
     /// The model (.pomdp or .pomdpx).
     file: PathBuf,
     /// Policy, as in `vigil pomdp compare`. Dual control uses K = 0.5.
-    #[arg(long, default_value = "escalation-1")]
+    #[arg(long, value_name = "POLICY", default_value = "escalation-1")]
     policy: String,
     /// Missions, 1 to 10000000.
-    #[arg(long, default_value_t = 1000, value_parser = count(1))]
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = count(1))]
     episodes: u64,
     /// Seed of the missions. Each command draws its own numbers from a seed.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Greatest number of steps of a mission. It ends earlier once the discount is below 1e-4.
-    #[arg(long, default_value_t = 2000, value_parser = count(1))]
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = count(1))]
     steps_max: u64,
     /// Actions that end a mission.
-    #[arg(long, value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
     ends: Vec<String>,
     /// Also record the true states.
     #[arg(long)]

@@ -33,10 +33,10 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = count(1))]
     beliefs_max: u64,
     /// Missions to sample.
-    #[arg(long, default_value_t = 1000, value_parser = count(2))]
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = count(2))]
     episodes: u64,
     /// Seed of the missions. Each command draws its own numbers from a seed.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Print one JSON document.
     #[arg(long)]
