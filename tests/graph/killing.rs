@@ -217,34 +217,3 @@ fn a_restarted_service_runs_on_what_the_launcher_has_read() {
     graph.finish();
     let _ = std::fs::remove_dir_all(folder);
 }
-
-#[test]
-fn a_rover_with_a_stuck_wheel_reaches_its_goal_while_services_are_replaced() {
-    let _machine = machine();
-    let options = ["--duration", "110", "--inject", "stuck:RM@5"];
-    let config = "config/corridor-people.toml".into();
-    let mut graph = RunningGraph::start_with(config, "corridor", &options);
-    let observed = graph.observe();
-    let mut health = HealthWatch::new(&observed);
-    let mut actions = ActionWatch::new(&observed);
-    for services in [&["supervisor"][..], &["detector"], &["identifier"]] {
-        actions.wait_for(RecoveryKind::Compensate, Duration::ZERO);
-        replace(&mut health, services);
-    }
-    let summary = graph.finish();
-    assert_eq!(summary.events("goal").len(), 1);
-    // From the first counter-steering (CP) on nobody calls a person (SH), or follows the path as if
-    // all wheels turned (FP).
-    let since = decided_since(&summary);
-    let first = since.iter().position(|what| what == "CP");
-    let after = first.map_or(&[][..], |first| &since[first..]);
-    let is_wrong = |what: &String| ["SH", "FP"].contains(&what.as_str());
-    assert!(
-        !after.is_empty() && !after.iter().any(is_wrong),
-        "{since:?}"
-    );
-    assert!(summary.events("latched").is_empty(), "{since:?}");
-    let told = summary.events("fault").into_iter().map(|event| event.1);
-    let told: Vec<String> = told.filter(|what| what.contains("STUCK")).collect();
-    assert_eq!(told, ["RM_STUCK is active"]);
-}

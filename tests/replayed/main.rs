@@ -3,6 +3,8 @@
 #![cfg(test)]
 
 mod graph;
+#[path = "../virtual_graph/mod.rs"]
+mod virtual_graph;
 
 use std::path::Path;
 

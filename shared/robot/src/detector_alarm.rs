@@ -8,8 +8,8 @@ use crate::alarm::Lull;
 /// Motion between two beliefs counts for at most this long, s. Chosen: ten observations of 50 ms.
 const STEP_MAX_S: f64 = 0.5;
 
-/// True if faults with a name are more probable than not. A reader of an alarm that has not seen how
-/// it began tells of nothing else, or hears nothing else, at first.
+/// True if faults with a name are more probable than not. A reader of an alarm that has not seen
+/// how it began tells of nothing else, or hears nothing else, at first.
 #[must_use]
 pub const fn are_named(p_nominal: f64, p_unknown: f64) -> bool {
     1.0 - p_nominal - p_unknown > 0.5

@@ -53,8 +53,9 @@ const UNKNOWN_CURRENT: f64 = 10.0;
 const UNKNOWN_TURN: f64 = 0.5;
 /// Share of channels that have one: two of seven, as what is unknown moves some and not all.
 const ANYTHING: f64 = 0.3;
-/// One observation speaks for or against a state by this much at most (natural logarithm). Less
-/// than the e^32 of [`FLOOR`]: no single one lifts a state from nothing.
+/// One observation speaks against a state, beside the one that it speaks for most, by this much at
+/// most (natural logarithm). Less than the e^32 of [`FLOOR`]: no single one lifts a state from
+/// nothing.
 const LOG_MAX: f64 = 30.0;
 /// These channels change odds by this factor at most: what nominal motion makes impossible they do
 /// not make likely. Times `set_probabilities::FLOOR` it is 1e-3.
@@ -241,13 +242,12 @@ impl FurtherFilter {
         let beside = without_common(&residuals.currents);
         for at in 0..self.states.len() {
             let log = self.log_ratio(self.states[at], observation, further, residuals, &beside);
-            let log = if log.is_finite() { log } else { 0.0 };
-            self.logs[at] = log.clamp(-LOG_MAX, LOG_MAX);
+            self.logs[at] = if log.is_finite() { log } else { 0.0 };
             largest = largest.max(self.logs[at]);
         }
         let mut total = 0.0;
         for (p, log) in self.p.iter_mut().zip(&self.logs) {
-            *p = (*p * (log - largest).exp()).max(FLOOR);
+            *p = (*p * (log - largest).max(-LOG_MAX).exp()).max(FLOOR);
             total += *p;
         }
         for p in &mut self.p {

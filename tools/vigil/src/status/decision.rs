@@ -20,6 +20,8 @@ pub struct Decision {
     pub chosen_by: &'static str,
     /// What the policy thinks of it, in the measure of `weighing`.
     pub value: f64,
+    /// What the policy thinks of each action, in the same measure, the best first.
+    pub actions: Vec<WeighedAction>,
     /// What it was weighed from; null if its numbers are not known.
     pub weighing: Option<NamedWeighing>,
     /// The most probable states of the decision model.
@@ -28,6 +30,15 @@ pub struct Decision {
     pub speed_scale: f64,
     /// Decisions so far.
     pub decision_count: u64,
+}
+
+/// An action of the decision model.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct WeighedAction {
+    /// Its name.
+    pub action: String,
+    /// What the policy thinks of it.
+    pub value: f64,
 }
 
 impl Decision {
@@ -47,11 +58,19 @@ impl Decision {
         let mut named: Vec<NamedState> = named.take(block.state_count as usize).collect();
         named.sort_by(|a, b| b.p.total_cmp(&a.p));
         named.truncate(STATES);
+        let weighed = actions.iter().zip(&block.value);
+        let weighed = weighed.map(|(action, value)| WeighedAction {
+            action: action.clone(),
+            value: *value,
+        });
+        let mut weighed: Vec<WeighedAction> = weighed.take(block.action_count as usize).collect();
+        weighed.sort_by(|a, b| b.value.total_cmp(&a.value));
         Self {
             action: setup.robot.action_text(action, block.answered()),
             has_expired: block.valid_until_ns < now_ns,
             chosen_by: chosen_by(block.control_mode),
             value: block.value.get(at).copied().unwrap_or_default(),
+            actions: weighed,
             weighing: weighing.map(|it| NamedWeighing::new(&it, states, actions)),
             states: named,
             speed_scale: block.speed_scale,
@@ -103,5 +122,22 @@ const fn chosen_by(control_mode: u32) -> &'static str {
         FALLBACK => "fallback",
         SAFE => "safe",
         _ => "?",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Document;
+    use crate::watch::sample::{self, NOW, setup};
+
+    #[test]
+    fn what_each_action_is_worth_is_listed_the_best_first() {
+        let setup = setup();
+        let document = Document::new(&sample::faulty(&setup), &setup, NOW);
+        let actions = document.decision.unwrap().actions;
+        let listed: Vec<_> = actions.iter().map(|it| (&*it.action, it.value)).collect();
+        assert_eq!(listed[..2], [("compensate", 1.5), ("go_on", -3.0)]);
+        assert_eq!(listed.len(), setup.decision.actions().len());
+        assert!(listed[2..].iter().all(|(_, value)| *value == -90.0));
     }
 }

@@ -74,6 +74,50 @@ fn faults_that_are_read_come_and_go_at_their_rates_and_the_others_are_held() {
 }
 
 #[test]
+fn a_stuck_wheel_is_told_again_after_readings_that_look_like_a_noisy_sensor() {
+    let mut filter = filter();
+    let observation = Observation {
+        dt_s: 0.05,
+        moving: true,
+        command: [0.3, 0.2],
+        ..Observation::default()
+    };
+    let mut further = Further::default();
+    for reading in &mut further.currents {
+        reading.push(1.0, None);
+    }
+    let expected = 0.2;
+    let by = filter.effect(STUCK, 4, &observation, expected);
+    assert!(
+        by[4] > 5.0,
+        "a wheel that stands draws many amperes: {by:?}"
+    );
+    let stuck = filter
+        .states
+        .iter()
+        .position(|it| *it == FurtherState::Stuck(4));
+    let stuck = stuck.unwrap();
+    // While a robot stops and starts again, the current is less and then as much.
+    for (share, count) in [(1.0, 10), (0.35, 4), (1.0, 20)] {
+        for _ in 0..count {
+            let residual = |wheel: usize| Residual {
+                apart: share * by[wheel],
+                variance: 0.0125,
+                expected,
+                outlier_rate: 0.0,
+            };
+            let mut residuals = Residuals::default();
+            residuals.currents[..6].copy_from_slice(&std::array::from_fn::<_, 6, _>(|wheel| {
+                Some(residual(wheel))
+            }));
+            filter.step(&observation, &further, &residuals);
+        }
+        let is_told = filter.p[stuck] > 0.5;
+        assert_eq!(is_told, share == 1.0, "{share}: {}", filter.p[stuck]);
+    }
+}
+
+#[test]
 fn in_the_unknown_each_channel_is_healthy_or_reads_anything() {
     let filter = filter();
     let residual = |apart: f64, variance: f64| Residual {

@@ -39,7 +39,12 @@ pub struct Args {
     #[arg(long, value_name = "POLICY", default_value = "fib")]
     policy: String,
     /// Greatest number of nodes of a graph, 1 to 60.
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=60))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 8,
+        value_parser = clap::value_parser!(u64).range(1..=60)
+    )]
     nodes: u64,
     /// Greatest sum of differences between beliefs that share a node of a graph, 0 to 2.
     #[arg(long, value_name = "X", default_value_t = 0.25)]

@@ -1,0 +1,307 @@
+//! Services die beside a fault, in any order, for any time: what was known stands, nobody is called
+//! for what has an answer, and nothing else is named.
+#![cfg(test)]
+
+mod virtual_graph;
+
+use std::fmt;
+use std::path::Path;
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use vigil_blocks::{
+    Action, EventKind, FaultRecord, FaultSource, FaultState, Faults, Health, RecoveryKind,
+};
+use vigil_cycle::port::Bus;
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{Graph, Receiver, Topic, VirtualClock};
+use vigil_setup::{Document, Setup};
+
+use virtual_graph::{Publisher, Stages, VirtualGraph, document};
+
+/// Faults, and what is to be done about them.
+struct Scenario {
+    config: &'static str,
+    inject: &'static [&'static str],
+    /// They are known and answered by then, s.
+    known_s: f64,
+    faults: &'static [&'static str],
+    answer: RecoveryKind,
+}
+
+/// Services are dead from an instant on, each until it is started again.
+struct Death {
+    from_s: f64,
+    until_s: Vec<(ServiceName, f64)>,
+}
+
+impl fmt::Display for Death {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "at {:.2} s", self.from_s)?;
+        for (service, until_s) in &self.until_s {
+            write!(f, " {} until {until_s:.2} s", service.as_str())?;
+        }
+        write!(f, "; ")
+    }
+}
+
+/// Two deaths of one service or several. Both, and how long they last, are drawn.
+fn deaths(rng: &mut Pcg64Mcg, known_s: f64) -> Vec<Death> {
+    let mut from_s = known_s;
+    let mut draw = || {
+        from_s += rng.random_range(0.2..8.0);
+        // One at least.
+        let subset = rng.random_range(1..8);
+        let chosen = ServiceName::STEPPING.into_iter().enumerate();
+        let chosen = chosen.filter(|(bit, _)| subset >> bit & 1 == 1);
+        let until_s: Vec<_> = chosen
+            .map(|(_, name)| (name, from_s + rng.random_range(0.05..1.5)))
+            .collect();
+        let death = Death { from_s, until_s };
+        let ends = death.until_s.iter().map(|(_, until_s)| *until_s);
+        from_s = ends.fold(from_s, f64::max);
+        death
+    };
+    vec![draw(), draw()]
+}
+
+/// What the supervisor did and told of.
+struct Watch {
+    actions: Box<dyn Receiver<Action>>,
+    faults: Box<dyn Receiver<Faults>>,
+    /// Kinds of action from `known_s` on, each once in a row, and since when.
+    kinds: Vec<(f64, RecoveryKind)>,
+    known_s: f64,
+    known: Box<Faults>,
+    told: Box<Faults>,
+    simulator: Box<dyn Receiver<Health>>,
+    at_goal: bool,
+}
+
+impl Watch {
+    fn new(graph: &Graph, known_s: f64) -> Self {
+        let simulator = Topic::Health(ServiceName::SensorSim);
+        Self {
+            actions: graph.receiver(Topic::Action).unwrap(),
+            faults: graph.receiver(Topic::Faults).unwrap(),
+            kinds: Vec::new(),
+            known_s,
+            known: Box::default(),
+            told: Box::default(),
+            simulator: graph.receiver(simulator).unwrap(),
+            at_goal: false,
+        }
+    }
+
+    fn look(&mut self, t_s: f64) {
+        let is_known = t_s >= self.known_s;
+        while let Some(action) = self.actions.take_next() {
+            let kind = RecoveryKind::from_repr(action.kind).unwrap();
+            let is_new = self.kinds.last().is_none_or(|(_, last)| *last != kind);
+            if is_known && is_new {
+                self.kinds.push((t_s, kind));
+            }
+        }
+        while let Some(health) = self.simulator.take_next() {
+            let goal = EventKind::Goal as u32;
+            self.at_goal |= health.events.iter().any(|event| event.kind == goal);
+        }
+        while let Some(faults) = self.faults.take_next() {
+            *self.told = *faults;
+            if !is_known {
+                *self.known = *faults;
+            }
+        }
+    }
+}
+
+/// Faults of the robot that were active, and how often each became so.
+fn active(faults: &Faults, setup: &Setup) -> Vec<(String, u32)> {
+    let of_robot = |it: &&FaultRecord| it.source == FaultSource::Robot as u32;
+    let active = faults.kept().filter(of_robot);
+    let active = active.filter(|it| it.state() != Some(FaultState::Pending));
+    active
+        .map(|it| (setup.tree.mode_name(it.what).to_owned(), it.count))
+        .collect()
+}
+
+/// The graph, from its first cycle on.
+fn drive(scenario: &Scenario, deaths: &[Death], kept: &Path, until_s: f64) -> (Watch, Setup) {
+    let text = document(scenario.config, |_| {}).to_text().unwrap();
+    let setup = Document::from_text(kept, text).unwrap().check().unwrap();
+    let (period_ns, clock) = (setup.period_ns(), VirtualClock::default());
+    let graph = Graph::InProcess(Bus::new(clock.clone()));
+    let mut watch = Watch::new(&graph, scenario.known_s);
+    let mut publisher = Publisher::new(&setup, &graph, scenario.inject);
+    clock.set(period_ns);
+    let mut stages = Stages::new(VirtualGraph {
+        setup: &setup,
+        graph: &graph,
+        clock: &clock,
+        kept,
+    });
+    let mut dead = Vec::new();
+    for k in 1..=(until_s * 1e9) as u64 / period_ns {
+        let t_ns = k * period_ns;
+        let is_now = |at_s: f64| (at_s * 1e9) as u64 / period_ns == k;
+        clock.set(t_ns);
+        for (name, until_s) in deaths.iter().flat_map(|death| &death.until_s) {
+            if is_now(*until_s) {
+                stages.start(*name);
+                dead.retain(|it| it != name);
+            }
+        }
+        for death in deaths.iter().filter(|death| is_now(death.from_s)) {
+            for (name, _) in &death.until_s {
+                stages.end(*name);
+                dead.push(*name);
+            }
+        }
+        publisher.turn(&clock, t_ns);
+        for name in ServiceName::STEPPING {
+            // Who hears nothing waits until its deadline.
+            if dead.contains(&name) {
+                clock.set(t_ns + period_ns - 1);
+            }
+            stages.turn(name);
+        }
+        watch.look(t_ns as f64 * 1e-9);
+    }
+    (watch, setup)
+}
+
+/// Why what was done with these deaths is wrong, if it is.
+fn wrong(scenario: &Scenario, deaths: &[Death], kept: &Path) -> Option<String> {
+    let last = deaths.iter().flat_map(|death| &death.until_s);
+    let until_s = last.fold(0.0, |until_s: f64, (_, it)| until_s.max(*it)) + 12.0;
+    let (watch, setup) = drive(scenario, deaths, kept, until_s);
+    let (answer, kinds) = (scenario.answer, &watch.kinds);
+    let is_answered = kinds.first().is_some_and(|(_, kind)| *kind == answer);
+    let allowed = [answer, RecoveryKind::Stop, RecoveryKind::SlowDown];
+    let is_right = kinds.iter().all(|(_, kind)| allowed.contains(kind));
+    let ends = kinds.last().is_some_and(|(_, kind)| *kind == answer);
+    // Each of them was told before, and nothing is told anew.
+    let (before, told) = (active(&watch.known, &setup), active(&watch.told, &setup));
+    let are_told = |name: &&str| told.iter().any(|(told, _)| told == name);
+    let is_told = scenario.faults.iter().all(are_told) && told == before;
+    let is_well = is_answered && is_right && ends && is_told;
+    (!is_well).then(|| format!("{kinds:?}; {before:?}, {told:?}"))
+}
+
+/// Each with deaths that are drawn anew.
+const DRIVES: u64 = 8;
+
+/// Nothing else is done or told, whoever dies.
+fn demand_the_same(scenario: &Scenario) {
+    let folder = tempfile::tempdir().unwrap();
+    for seed in 0..DRIVES {
+        let mut rng = Pcg64Mcg::seed_from_u64(seed);
+        let deaths = deaths(&mut rng, scenario.known_s);
+        let kept = folder.path().join(seed.to_string());
+        let wrong = wrong(scenario, &deaths, &kept);
+        let deaths: String = deaths.iter().map(ToString::to_string).collect();
+        assert_eq!(wrong, None, "seed {seed}: {deaths}");
+    }
+}
+
+const STUCK: Scenario = Scenario {
+    config: "rover.toml",
+    inject: &["stuck:RM@3"],
+    known_s: 6.0,
+    faults: &["RM_STUCK"],
+    answer: RecoveryKind::Compensate,
+};
+
+const ENCODER: Scenario = Scenario {
+    inject: &["encoder:LF:zero@3"],
+    faults: &["LF_ENC"],
+    answer: RecoveryKind::IgnoreEncoder,
+    ..STUCK
+};
+
+/// The yaw rate and the motors' currents are measured, too.
+const ALL: &str = "rover-all.toml";
+
+#[test]
+fn a_stuck_wheel_stays_compensated() {
+    demand_the_same(&STUCK);
+}
+
+#[test]
+fn a_stuck_wheel_stays_compensated_where_currents_are_measured() {
+    demand_the_same(&Scenario {
+        config: ALL,
+        ..STUCK
+    });
+}
+
+#[test]
+fn a_broken_encoder_stays_ignored() {
+    demand_the_same(&ENCODER);
+    demand_the_same(&Scenario {
+        config: ALL,
+        ..ENCODER
+    });
+}
+
+#[test]
+fn a_rover_with_two_stuck_wheels_limps_on() {
+    demand_the_same(&Scenario {
+        inject: &["stuck:RM@3", "stuck:LF@3"],
+        known_s: 8.0,
+        faults: &["LF_STUCK", "RM_STUCK"],
+        answer: RecoveryKind::LimpHome,
+        ..STUCK
+    });
+}
+
+#[test]
+fn a_call_for_help_stands() {
+    demand_the_same(&Scenario {
+        inject: &["stuck:RM@3", "stuck:RF@3"],
+        known_s: 8.0,
+        faults: &["RF_STUCK", "RM_STUCK"],
+        answer: RecoveryKind::CallForHelp,
+        ..STUCK
+    });
+}
+
+#[test]
+fn a_healthy_rover_drives_on() {
+    for config in ["rover.toml", ALL] {
+        demand_the_same(&Scenario {
+            config,
+            inject: &[],
+            faults: &[],
+            answer: RecoveryKind::GoOn,
+            ..STUCK
+        });
+    }
+}
+
+#[test]
+fn a_rover_with_a_stuck_wheel_reaches_its_goal_though_each_service_dies() {
+    let scenario = Scenario {
+        config: "corridor-people.toml",
+        inject: &["stuck:RM@5"],
+        known_s: 12.0,
+        ..STUCK
+    };
+    let death = |from_s: f64, name| Death {
+        from_s,
+        until_s: vec![(name, from_s + 0.4)],
+    };
+    let deaths = [
+        death(14.0, ServiceName::Supervisor),
+        death(22.0, ServiceName::Detector),
+        death(30.0, ServiceName::Identifier),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let (watch, setup) = drive(&scenario, &deaths, &folder.path().join("kept"), 120.0);
+    assert!(watch.at_goal, "{:?}", watch.kinds);
+    // Nobody calls a person, or drives as if all wheels turned.
+    let is_wrong = |kind| [RecoveryKind::CallForHelp, RecoveryKind::GoOn].contains(&kind);
+    let all_right = watch.kinds.iter().all(|(_, kind)| !is_wrong(*kind));
+    assert!(all_right && !watch.kinds.is_empty(), "{:?}", watch.kinds);
+    assert_eq!(active(&watch.told, &setup), [("RM_STUCK".to_owned(), 1)]);
+}
