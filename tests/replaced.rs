@@ -1,5 +1,5 @@
-//! Services die beside a fault, in any order, for any time: what was known stands, nobody is called
-//! for what has an answer, and nothing else is named.
+//! Services die beside a fault, one or several, twice: what was known stands, nobody is called for
+//! what has an answer, and nothing else is named.
 #![cfg(test)]
 
 mod virtual_graph;
@@ -49,6 +49,7 @@ impl fmt::Display for Death {
 fn deaths(rng: &mut Pcg64Mcg, known_s: f64) -> Vec<Death> {
     let mut from_s = known_s;
     let mut draw = || {
+        // The second may begin while services of the first are dead.
         from_s += rng.random_range(0.2..8.0);
         // One at least.
         let subset = rng.random_range(1..8);
@@ -57,10 +58,7 @@ fn deaths(rng: &mut Pcg64Mcg, known_s: f64) -> Vec<Death> {
         let until_s: Vec<_> = chosen
             .map(|(_, name)| (name, from_s + rng.random_range(0.05..1.5)))
             .collect();
-        let death = Death { from_s, until_s };
-        let ends = death.until_s.iter().map(|(_, until_s)| *until_s);
-        from_s = ends.fold(from_s, f64::max);
-        death
+        Death { from_s, until_s }
     };
     vec![draw(), draw()]
 }
@@ -75,7 +73,7 @@ struct Watch {
     known: Box<Faults>,
     told: Box<Faults>,
     simulator: Box<dyn Receiver<Health>>,
-    at_goal: bool,
+    goal_s: Option<f64>,
 }
 
 impl Watch {
@@ -89,7 +87,7 @@ impl Watch {
             known: Box::default(),
             told: Box::default(),
             simulator: graph.receiver(simulator).unwrap(),
-            at_goal: false,
+            goal_s: None,
         }
     }
 
@@ -104,7 +102,9 @@ impl Watch {
         }
         while let Some(health) = self.simulator.take_next() {
             let goal = EventKind::Goal as u32;
-            self.at_goal |= health.events.iter().any(|event| event.kind == goal);
+            if health.events.iter().any(|event| event.kind == goal) {
+                self.goal_s.get_or_insert(t_s);
+            }
         }
         while let Some(faults) = self.faults.take_next() {
             *self.told = *faults;
@@ -119,7 +119,7 @@ impl Watch {
 fn active(faults: &Faults, setup: &Setup) -> Vec<(String, u32)> {
     let of_robot = |it: &&FaultRecord| it.source == FaultSource::Robot as u32;
     let active = faults.kept().filter(of_robot);
-    let active = active.filter(|it| it.state() != Some(FaultState::Pending));
+    let active = active.filter(|it| it.state() == Some(FaultState::Active));
     active
         .map(|it| (setup.tree.mode_name(it.what).to_owned(), it.count))
         .collect()
@@ -170,16 +170,24 @@ fn drive(scenario: &Scenario, deaths: &[Death], kept: &Path, until_s: f64) -> (W
     (watch, setup)
 }
 
+/// A drive goes on so long after the last death, s.
+const AFTER_S: f64 = 12.0;
+/// The answer stands so long after the last death, s.
+const AGAIN_S: f64 = 4.0;
+
 /// Why what was done with these deaths is wrong, if it is.
 fn wrong(scenario: &Scenario, deaths: &[Death], kept: &Path) -> Option<String> {
     let last = deaths.iter().flat_map(|death| &death.until_s);
-    let until_s = last.fold(0.0, |until_s: f64, (_, it)| until_s.max(*it)) + 12.0;
+    let until_s = last.fold(0.0, |until_s: f64, (_, it)| until_s.max(*it)) + AFTER_S;
     let (watch, setup) = drive(scenario, deaths, kept, until_s);
     let (answer, kinds) = (scenario.answer, &watch.kinds);
     let is_answered = kinds.first().is_some_and(|(_, kind)| *kind == answer);
     let allowed = [answer, RecoveryKind::Stop, RecoveryKind::SlowDown];
     let is_right = kinds.iter().all(|(_, kind)| allowed.contains(kind));
+    // Nobody needs longer than this to do it again.
+    let last_s = kinds.last().map_or(f64::INFINITY, |(t_s, _)| *t_s);
     let ends = kinds.last().is_some_and(|(_, kind)| *kind == answer);
+    let ends = ends && last_s < until_s - AFTER_S + AGAIN_S;
     // Each of them was told before, and nothing is told anew.
     let (before, told) = (active(&watch.known, &setup), active(&watch.told, &setup));
     let are_told = |name: &&str| told.iter().any(|(told, _)| told == name);
@@ -188,13 +196,13 @@ fn wrong(scenario: &Scenario, deaths: &[Death], kept: &Path) -> Option<String> {
     (!is_well).then(|| format!("{kinds:?}; {before:?}, {told:?}"))
 }
 
-/// Each with deaths that are drawn anew.
-const DRIVES: u64 = 8;
+/// Seeds of the deaths.
+const SEEDS: [u64; 8] = [0, 1, 17, 42, 183, 195, 239, 240];
 
 /// Nothing else is done or told, whoever dies.
 fn demand_the_same(scenario: &Scenario) {
     let folder = tempfile::tempdir().unwrap();
-    for seed in 0..DRIVES {
+    for seed in SEEDS {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let deaths = deaths(&mut rng, scenario.known_s);
         let kept = folder.path().join(seed.to_string());
@@ -292,13 +300,22 @@ fn a_rover_with_a_stuck_wheel_reaches_its_goal_though_each_service_dies() {
         until_s: vec![(name, from_s + 0.4)],
     };
     let deaths = [
-        death(14.0, ServiceName::Supervisor),
-        death(22.0, ServiceName::Detector),
+        death(16.0, ServiceName::Supervisor),
+        death(23.0, ServiceName::Detector),
         death(30.0, ServiceName::Identifier),
     ];
     let folder = tempfile::tempdir().unwrap();
     let (watch, setup) = drive(&scenario, &deaths, &folder.path().join("kept"), 120.0);
-    assert!(watch.at_goal, "{:?}", watch.kinds);
+    let goal_s = watch.goal_s.unwrap();
+    for death in &deaths {
+        let mut before = watch.kinds.iter().filter(|(t_s, _)| *t_s < death.from_s);
+        let is_steered = matches!(before.next_back(), Some((_, RecoveryKind::Compensate)));
+        assert!(
+            is_steered && goal_s > death.from_s + 1.0,
+            "{death}{goal_s}, {:?}",
+            watch.kinds
+        );
+    }
     // Nobody calls a person, or drives as if all wheels turned.
     let is_wrong = |kind| [RecoveryKind::CallForHelp, RecoveryKind::GoOn].contains(&kind);
     let all_right = watch.kinds.iter().all(|(_, kind)| !is_wrong(*kind));

@@ -147,10 +147,20 @@ mod tests {
         ids.into_iter().map(|it| it.id).collect()
     }
 
+    /// How far behind others the calling thread is.
+    fn nice() -> i32 {
+        // SAFETY: a plain system call on the calling thread.
+        #[allow(unsafe_code)]
+        unsafe {
+            libc::getpriority(libc::PRIO_PROCESS, 0)
+        }
+    }
+
     #[test]
     fn who_keeps_off_cores_runs_on_the_others_if_there_are_any_and_behind_everybody_else() {
         let all = cores();
         let observer = std::thread::spawn(move || {
+            let before = nice();
             keep_off(&[all[0], usize::MAX]);
             let others = cores();
             match all.len() {
@@ -159,10 +169,8 @@ mod tests {
             }
             keep_off(&all);
             assert_eq!(cores(), others, "there are no others");
-            // SAFETY: a plain system call on the calling thread.
-            #[allow(unsafe_code)]
-            let nice = unsafe { libc::getpriority(libc::PRIO_PROCESS, 0) };
-            assert_eq!(nice, 15);
+            // Without a privilege nobody comes forward.
+            assert_eq!(nice().max(before), before.max(15));
         });
         observer.join().unwrap();
     }

@@ -7,8 +7,9 @@ use vigil_robot::detector_alarm::are_named;
 /// Detections in a row without a diagnosis after which the identifier counts as lost, as every
 /// input of a service does (`vigil_cycle`).
 const LOST_AFTER: u32 = 3;
-/// For how long nobody is called once the identifier that knew of an alarm is lost, s. Chosen:
-/// longer than one that is replaced takes to begin and to see how a robot in motion fails.
+/// For how long nobody is called beside an alarm once an identifier is lost or a supervisor begins,
+/// s. Chosen: longer than an identifier that is replaced takes to begin and to see how a robot in
+/// motion fails.
 const RETURN_S: f64 = 5.0;
 
 /// Follows whether the identifier knows of an alarm that stands.
@@ -25,8 +26,10 @@ pub(crate) struct Hearing {
     unanswered: u32,
     /// Detections beside an alarm in a row without an identifier that knows of it.
     unheard: u32,
-    /// Time since an identifier was heard last, s, if another one is waited for. Another one that
-    /// is heard and lost again is waited for anew; one that is never heard is not.
+    /// Identifier that knew of an alarm last, and the one whose loss began the wait.
+    known_epoch: u64,
+    lost_epoch: u64,
+    /// Time since that loss, or since the supervisor began, s, while another one is waited for.
     waited_s: Option<f64>,
     /// It is waited for since one was lost.
     was_lost: bool,
@@ -48,13 +51,25 @@ impl Hearing {
     pub(crate) fn take_diagnosis(&mut self, diagnosis: &FaultBelief) {
         let is_another = diagnosis.header.epoch != self.epoch;
         if self.alarm && self.is_heard() && is_another {
-            self.waited_s = Some(0.0);
+            self.begin_wait();
         }
         self.unanswered = 0;
         self.epoch = diagnosis.header.epoch;
         let are_named = are_named(diagnosis.p[0], diagnosis.p_unknown);
         let may_tell = are_named || !self.waits() || self.epoch == self.heard_epoch;
         self.knows = diagnosis.identifying != 0 && may_tell;
+        if self.knows {
+            self.known_epoch = self.epoch;
+        }
+    }
+
+    /// The identifier that knew of the alarm is lost. Each is waited for once, until one is heard
+    /// for good: one that is heard now and then does not put off a call for ever.
+    const fn begin_wait(&mut self) {
+        if self.known_epoch != self.lost_epoch {
+            self.lost_epoch = self.known_epoch;
+            self.waited_s = Some(0.0);
+        }
     }
 
     /// Takes a detection `passed_s` after the one before, beside the detector's alarm or none.
@@ -70,15 +85,17 @@ impl Hearing {
         // Another one that is heard in its place has not seen all yet.
         let is_another = self.epoch != self.heard_epoch;
         let goes_on = alarm && self.waits() && (is_another || !is_heard);
-        let waited_s = self.waited_s.filter(|_| self.unheard != LOST_AFTER);
+        if self.unheard == LOST_AFTER {
+            self.begin_wait();
+        }
         self.waited_s = match goes_on || self.unheard >= LOST_AFTER {
-            true => Some(waited_s.unwrap_or(0.0) + passed_s),
+            true => Some(self.waited_s.unwrap_or(0.0) + passed_s),
             false => None,
         };
         self.was_lost |= self.unheard >= LOST_AFTER;
         self.was_lost &= self.waited_s.is_some();
         if is_heard && self.waited_s.is_none() {
-            self.heard_epoch = self.epoch;
+            (self.heard_epoch, self.lost_epoch) = (self.epoch, 0);
         }
     }
 

@@ -17,9 +17,11 @@ mod navigation;
 mod planning;
 mod supervisor;
 
-/// Largest length of a graph's name. It stands twice in the paths of sockets, and more have no room
-/// below `/run/vigil`; a longer runtime folder leaves less (`vigil_cycle::Domain`).
-pub const NAME_LENGTH_MAX: usize = 21;
+/// Largest length of a graph's name. It stands twice in the paths of sockets, and a longer one has
+/// no room below `/run/vigil`; a longer runtime folder leaves less (`vigil_cycle::Domain`).
+pub const NAME_LENGTH_MAX: usize = 22;
+/// Largest length of the file name of a socket that takes frames. Chosen: as long as anyone needs.
+const SOCKET_NAME_LENGTH_MAX: usize = 24;
 
 /// Checks a graph file; `report` gets the key and a message for each problem.
 pub(crate) fn graph(
@@ -163,13 +165,13 @@ fn socket(socket: &Socket, report: &mut impl FnMut(&str, String)) {
     }
     let name = &socket.unix;
     let legal = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-    let is_name = name.chars().all(legal) && name.len() <= NAME_LENGTH_MAX;
+    let is_name = name.chars().all(legal) && name.len() <= SOCKET_NAME_LENGTH_MAX;
     let is_socket = name
         .strip_suffix(".sock")
         .is_some_and(|stem| !stem.is_empty());
     if !(name.is_empty() || is_name && is_socket) {
         let allowed = format!(
-            "at most {NAME_LENGTH_MAX} letters, digits, '-', '_' or '.', ending in '.sock'"
+            "at most {SOCKET_NAME_LENGTH_MAX} letters, digits, '-', '_' or '.', ending in '.sock'"
         );
         let message = format!("'{name}' is not a name: allowed are {allowed}");
         report("sensor.socket.unix", message);

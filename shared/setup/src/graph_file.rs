@@ -82,7 +82,7 @@ pub struct GraphFile {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GraphSettings {
-    /// Name; two graphs with one name cannot run on one machine. Letters, digits, `-`, at most 24.
+    /// Name; two graphs with one name cannot run on one machine. Letters, digits, `-`, at most 22.
     pub name: String,
     /// Rate of the sensor's schedule. A playback has the recording's own instead.
     #[schemars(range(min = 1.0, max = 10_000.0))]

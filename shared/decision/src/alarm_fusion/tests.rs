@@ -242,6 +242,16 @@ fn an_identifier_that_is_lost_is_waited_for_before_help_is_called() {
         [(); 20].map(|()| next(Some(&another))).last(),
         Some(&(true, true))
     );
+    // One that names a fault now and then is not waited for again and again.
+    (another.header.epoch, another.p_unknown) = (10, 0.4);
+    let mut since = 0;
+    for k in 0..1500 {
+        let is_named = k % 20 < 10;
+        another.p_unknown = if is_named { 0.4 } else { 0.6 };
+        let may_latch = next(Some(&another)).1;
+        since = if may_latch { since } else { k };
+    }
+    assert!((400..1020).contains(&since), "{since}");
     // What is not sound is no answer.
     let mut fusion = AlarmFusion::new(0.5);
     for k in 1..20 {

@@ -69,6 +69,11 @@ impl Detection {
         self.sight.pass(moved_s);
     }
 
+    /// True if the robot has moved long enough without an alarm to have been whole.
+    pub fn has_seen_quiet(&self) -> bool {
+        self.sight.has_seen_quiet()
+    }
+
     /// True if what was found is to be told, faults with a name (`are_named`) or anything else. Who
     /// has not seen how an alarm began finds the robot neither healthy nor inexplicable before it
     /// has seen enough.

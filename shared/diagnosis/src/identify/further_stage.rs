@@ -57,9 +57,12 @@ impl FurtherStage {
         self.ring.clear();
     }
 
-    /// Starts from a whole robot.
-    pub fn restart(&mut self) {
-        self.filter.restart();
+    /// Starts from a whole robot. What was learned on the way is forgotten unless that was one.
+    pub fn restart(&mut self, was_whole: bool) {
+        match was_whole {
+            true => self.filter.restart(),
+            false => self.filter.begin_run(&self.robot),
+        }
     }
 
     /// Adds an observation to the ring; the oldest gives way. What is believed of a healthy robot

@@ -322,7 +322,7 @@ impl Identifier {
         let healthy = self.healthy(kept);
         self.engine.restart(&healthy, kept.observation.t_ns);
         if let Some(further) = &mut self.further {
-            further.restart();
+            further.restart(self.detection.has_seen_quiet());
         }
         self.phase = Phase::Identifying(start + 1);
         self.sizes = NodeSizes::default();
