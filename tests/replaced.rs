@@ -300,21 +300,18 @@ fn a_rover_with_a_stuck_wheel_reaches_its_goal_though_each_service_dies() {
         until_s: vec![(name, from_s + 0.4)],
     };
     let deaths = [
-        death(16.0, ServiceName::Supervisor),
-        death(23.0, ServiceName::Detector),
+        death(20.0, ServiceName::Supervisor),
+        death(25.0, ServiceName::Detector),
         death(30.0, ServiceName::Identifier),
     ];
     let folder = tempfile::tempdir().unwrap();
     let (watch, setup) = drive(&scenario, &deaths, &folder.path().join("kept"), 120.0);
     let goal_s = watch.goal_s.unwrap();
     for death in &deaths {
-        let mut before = watch.kinds.iter().filter(|(t_s, _)| *t_s < death.from_s);
-        let is_steered = matches!(before.next_back(), Some((_, RecoveryKind::Compensate)));
-        assert!(
-            is_steered && goal_s > death.from_s + 1.0,
-            "{death}{goal_s}, {:?}",
-            watch.kinds
-        );
+        let soon_s = death.from_s + 1.0;
+        let mut kinds = watch.kinds.iter().filter(|(t_s, _)| *t_s < soon_s);
+        let is_steered = matches!(kinds.next_back(), Some((_, RecoveryKind::Compensate)));
+        assert!(is_steered && goal_s > soon_s, "{death}{:?}", watch.kinds);
     }
     // Nobody calls a person, or drives as if all wheels turned.
     let is_wrong = |kind| [RecoveryKind::CallForHelp, RecoveryKind::GoOn].contains(&kind);
