@@ -275,6 +275,22 @@ fn a_call_for_help_stands() {
 }
 
 #[test]
+fn a_call_about_a_weak_motor_or_a_broken_gyro_stands() {
+    for (inject, faults) in [
+        (&["torque-loss:LR:0.9@3"], &["LR_TORQUE"]),
+        (&["gyro-bias:0.2@3"], &["GYRO"]),
+    ] {
+        demand_the_same(&Scenario {
+            config: ALL,
+            inject,
+            known_s: 10.0,
+            faults,
+            answer: RecoveryKind::CallForHelp,
+        });
+    }
+}
+
+#[test]
 fn a_healthy_rover_drives_on() {
     for config in ["rover.toml", ALL] {
         demand_the_same(&Scenario {
