@@ -108,11 +108,17 @@ class Graph:
         wait_for(lambda: self.told("armed"), "a drive")
         return folder
 
+    def listed(self):
+        """What `vigil list` says of it, if it runs."""
+        from schemas import problems
+
+        document = json.loads(vigil("list", "--json").stdout)
+        assert not (wrong := problems("list", document)), wrong
+        return next((of for of in document["graphs"] if of["name"] == self.name), None)
+
     def pid(self, service):
         """The process of a service."""
-        listed = json.loads(vigil("list", "--json").stdout)["graphs"]
-        services = next(of["services"] for of in listed if of["name"] == self.name)
-        return next(of["pid"] for of in services if of["name"] == service)
+        return next(of["pid"] for of in self.listed()["services"] if of["name"] == service)
 
     def finish(self):
         """Waits for the end; the summary."""

@@ -94,8 +94,8 @@ class BlackBox(unittest.TestCase):
 
     def blackbox(self, graph):
         """Its process id."""
-        listed = json.loads(vigil("list", "--json").stdout)["graphs"]
-        return next((of["blackbox"] for of in listed if of["name"] == graph.name), None)
+        listed = graph.listed()
+        return listed and listed["blackbox"]
 
     def states(self, graph):
         """Of its faults, by name."""

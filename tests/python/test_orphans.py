@@ -42,20 +42,13 @@ class Orphans(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.recordings = pathlib.Path(folder.name)
 
-    def listed(self, graph):
-        """What `vigil list` says of the graph, if it runs."""
-        said = vigil("list", "--json")
-        document = json.loads(said.stdout)
-        self.assertEqual(problems("list", document), [])
-        return next((of for of in document["graphs"] if of["name"] == graph.name), None)
-
     def orphan(self, graph):
         """Kills the launcher of a graph once its black box keeps what it does; its folder, and what is listed then."""
         # Whatever fails, nothing goes on after the test.
-        self.addCleanup(lambda: self.listed(graph) and vigil("stop", "--graph", graph.name))
+        self.addCleanup(lambda: graph.listed() and vigil("stop", "--graph", graph.name))
         folder = graph.wait_until_armed()
-        wait_for(lambda: self.listed(graph)["blackbox"] and (folder / "memory/ring").exists(), "its black box")
-        before = self.listed(graph)
+        wait_for(lambda: graph.listed()["blackbox"] and (folder / "memory/ring").exists(), "its black box")
+        before = graph.listed()
         self.assertEqual(before["launcher"], graph.launcher.pid)
         pids = {of["pid"] for of in before["services"]} | {before["blackbox"], before["launcher"]}
         self.assertEqual(members(folder), pids, "there is nobody else")
@@ -63,7 +56,7 @@ class Orphans(unittest.TestCase):
         self.assertTrue(any(path.is_socket() for path in folder.rglob("*")))
         graph.launcher.kill()
         graph.launcher.wait()
-        after = self.listed(graph)
+        after = graph.listed()
         self.assertEqual(after, {**before, "launcher": None, "up_s": after["up_s"]}, "all else drives on")
         self.assertTrue(lives(after["blackbox"]))
         said = vigil("list")
@@ -73,7 +66,7 @@ class Orphans(unittest.TestCase):
         return folder, after
 
     def assert_nothing_is_left(self, graph, folder, *pids):
-        self.assertIsNone(self.listed(graph))
+        self.assertIsNone(graph.listed())
         self.assertEqual([pid for pid in pids if lives(pid)], [])
         self.assertEqual(members(folder), set())
         self.assertEqual(shared_memory(graph), [])
@@ -90,8 +83,8 @@ class Orphans(unittest.TestCase):
             command = [BINARIES / "vigil", "run", "--adopt", "--json", "--graph", graph.name]
             launcher = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
             self.addCleanup(launcher.kill)
-            wait_for(lambda: self.listed(graph)["launcher"], "the new launcher")
-            adopted = self.listed(graph)
+            wait_for(lambda: graph.listed()["launcher"], "the new launcher")
+            adopted = graph.listed()
             self.assertEqual(adopted, {**orphan, "launcher": launcher.pid, "up_s": adopted["up_s"]})
             self.assertEqual(vigil("snapshot", "taken over", "--graph", graph.name).returncode, 0)
             wait_for(lambda: list(self.recordings.glob("*/*-request.mcap")), "what the same black box writes")
@@ -99,8 +92,8 @@ class Orphans(unittest.TestCase):
             # The new launcher is not its parent, and sees its end all the same.
             os.kill(orphan["blackbox"], signal.SIGKILL)
             known = [None, orphan["blackbox"]]
-            wait_for(lambda: self.listed(graph)["blackbox"] not in known, "another black box")
-            again = self.listed(graph)
+            wait_for(lambda: graph.listed()["blackbox"] not in known, "another black box")
+            again = graph.listed()
             self.assertTrue(lives(again["blackbox"]))
             self.assertEqual(again["services"], orphan["services"])
             wait_for(lambda: list(self.recordings.glob("*/*-crash.mcap")), "what the killed one kept")
