@@ -15,13 +15,18 @@ use vigil_blocks::{
 use vigil_cycle::port::Bus;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Graph, Receiver, Topic, VirtualClock};
+use vigil_learning::channel_learning::{Log, learn};
+use vigil_setup::graph_file::GraphFile;
 use vigil_setup::{Document, Setup};
 
+use virtual_graph::kobuki::Kobuki;
 use virtual_graph::{Publisher, Stages, VirtualGraph, document};
 
 /// Faults, and what is to be done about them.
-struct Scenario {
+struct Scenario<'a> {
     config: &'static str,
+    /// Another model than that of the configuration.
+    model: Option<&'a Path>,
     inject: &'static [&'static str],
     /// They are known and answered by then, s.
     known_s: f64,
@@ -126,8 +131,13 @@ fn active(faults: &Faults, setup: &Setup) -> Vec<(String, u32)> {
 }
 
 /// The graph, from its first cycle on.
-fn drive(scenario: &Scenario, deaths: &[Death], kept: &Path, until_s: f64) -> (Watch, Setup) {
-    let text = document(scenario.config, |_| {}).to_text().unwrap();
+fn drive(scenario: &Scenario<'_>, deaths: &[Death], kept: &Path, until_s: f64) -> (Watch, Setup) {
+    let learned = |file: &mut GraphFile| {
+        if let Some(model) = scenario.model {
+            file.files.model = model.display().to_string();
+        }
+    };
+    let text = document(scenario.config, learned).to_text().unwrap();
     let setup = Document::from_text(kept, text).unwrap().check().unwrap();
     let (period_ns, clock) = (setup.period_ns(), VirtualClock::default());
     let graph = Graph::InProcess(Bus::new(clock.clone()));
@@ -176,7 +186,7 @@ const AFTER_S: f64 = 12.0;
 const AGAIN_S: f64 = 4.0;
 
 /// Why what was done with these deaths is wrong, if it is.
-fn wrong(scenario: &Scenario, deaths: &[Death], kept: &Path) -> Option<String> {
+fn wrong(scenario: &Scenario<'_>, deaths: &[Death], kept: &Path) -> Option<String> {
     let last = deaths.iter().flat_map(|death| &death.until_s);
     let until_s = last.fold(0.0, |until_s: f64, (_, it)| until_s.max(*it)) + AFTER_S;
     let (watch, setup) = drive(scenario, deaths, kept, until_s);
@@ -200,7 +210,7 @@ fn wrong(scenario: &Scenario, deaths: &[Death], kept: &Path) -> Option<String> {
 const SEEDS: [u64; 8] = [0, 1, 17, 42, 183, 195, 239, 240];
 
 /// Nothing else is done or told, whoever dies.
-fn demand_the_same(scenario: &Scenario) {
+fn demand_the_same(scenario: &Scenario<'_>) {
     let folder = tempfile::tempdir().unwrap();
     for seed in SEEDS {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
@@ -212,15 +222,16 @@ fn demand_the_same(scenario: &Scenario) {
     }
 }
 
-const STUCK: Scenario = Scenario {
+const STUCK: Scenario<'_> = Scenario {
     config: "rover.toml",
+    model: None,
     inject: &["stuck:RM@3"],
     known_s: 6.0,
     faults: &["RM_STUCK"],
     answer: RecoveryKind::Compensate,
 };
 
-const ENCODER: Scenario = Scenario {
+const ENCODER: Scenario<'_> = Scenario {
     inject: &["encoder:LF:zero@3"],
     faults: &["LF_ENC"],
     answer: RecoveryKind::IgnoreEncoder,
@@ -286,6 +297,7 @@ fn a_call_about_a_weak_motor_or_a_broken_gyro_stands() {
             known_s: 10.0,
             faults,
             answer: RecoveryKind::CallForHelp,
+            ..STUCK
         });
     }
 }
@@ -301,6 +313,35 @@ fn a_healthy_rover_drives_on() {
             ..STUCK
         });
     }
+}
+
+#[test]
+fn so_it_is_of_a_robot_whose_model_was_learned_from_its_log() {
+    let config = "kobuki.toml";
+    let setup = document(config, |_| {}).check().unwrap();
+    let log = [Kobuki::new(&setup.robot, &[], 2).drive(setup.file.graph.rate_hz, 900.0)];
+    let (model, _) = learn(&Log::of_healthy(&log), &setup.robot).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("kobuki.toml");
+    std::fs::write(&file, model.to_toml().unwrap()).unwrap();
+    let kobuki = Scenario {
+        config,
+        model: Some(&file),
+        known_s: 16.0,
+        ..STUCK
+    };
+    demand_the_same(&Scenario {
+        inject: &[],
+        faults: &[],
+        answer: RecoveryKind::GoOn,
+        ..kobuki
+    });
+    demand_the_same(&Scenario {
+        inject: &["stuck:L@8"],
+        faults: &["drive_L"],
+        answer: RecoveryKind::CallForHelp,
+        ..kobuki
+    });
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Archives a measurement: its result in `bench/results/`, its raw data in `target/bench/`.
+//! Archives a measurement: its result in `bench/results/`, its raw data in `target/bench/`. Or
+//! prints the same result as JSON.
 
 use std::fs;
 use std::io;
@@ -6,6 +7,8 @@ use std::path::{Component, Path, PathBuf};
 use std::process::Command;
 
 use serde_json::{Map, Value};
+
+use vigil_terminal::output::json;
 
 use crate::machine::{self, output};
 use crate::results::{Raw, Run, SCHEMA_VERSION};
@@ -16,9 +19,30 @@ const RESULTS: &str = "bench/results";
 /// Where raw data lie, from the project's folder: not kept in git.
 const RAW: &str = "target/bench";
 
-/// A measurement that is being archived.
+/// Where a result goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outlet {
+    /// To `bench/results/`, raw data to `target/bench/`; lines to standard output.
+    Files,
+    /// To standard output, as one JSON document; lines to standard error. No file is written.
+    Json,
+}
+
+impl Outlet {
+    /// As `--json` says.
+    #[must_use]
+    pub const fn of(json: bool) -> Self {
+        match json {
+            true => Self::Json,
+            false => Self::Files,
+        }
+    }
+}
+
+/// A measurement that is being archived, or printed.
 #[derive(Debug)]
 pub struct Archive {
+    outlet: Outlet,
     run: Run,
     host: String,
     /// Names of raw files that are pages to read.
@@ -26,22 +50,17 @@ pub struct Archive {
 }
 
 impl Archive {
-    /// Makes the folder of raw data for `question` and reads the machine's facts. It is made anew:
+    /// Reads the machine's facts. With files it makes the folder of raw data for `question` anew:
     /// what an earlier measurement has left in it goes, so that no result lies beside data of
     /// another one.
     ///
     /// # Errors
     /// The file system's, and a `question` that is no name of a folder.
-    pub fn new(question: &str) -> io::Result<Self> {
+    pub fn new(question: &str, outlet: Outlet) -> io::Result<Self> {
         if !is_name(question) {
             let text = format!("archive '{question}': allowed is the name of one folder");
             return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
         }
-        let folder = root().join(RAW).join(question);
-        if fs::exists(&folder)? {
-            fs::remove_dir_all(&folder)?;
-        }
-        fs::create_dir_all(&folder)?;
         let words: Vec<String> = std::env::args().skip(1).collect();
         let mut machine = machine::facts();
         let commit = machine.as_object_mut().and_then(|of| of.remove("commit"));
@@ -58,26 +77,35 @@ impl Archive {
             raw: Vec::new(),
         };
         let host = output(&mut Command::new("hostname"));
-        Ok(Self {
+        let archive = Self {
+            outlet,
             run,
             host,
             pages: Vec::new(),
-        })
+        };
+        if let Some(folder) = archive.folder() {
+            if fs::exists(&folder)? {
+                fs::remove_dir_all(&folder)?;
+            }
+            fs::create_dir_all(&folder)?;
+        }
+        Ok(archive)
     }
 
-    /// Where its raw data lie.
+    /// Where its raw data lie, if they are kept.
     #[must_use]
-    pub fn folder(&self) -> PathBuf {
-        root().join(RAW).join(&self.run.question)
+    pub fn folder(&self) -> Option<PathBuf> {
+        let folder = || root().join(RAW).join(&self.run.question);
+        (self.outlet == Outlet::Files).then(folder)
     }
 
-    /// Stores data; they are figures of the result, too, if that stays small with them.
+    /// Stores data; they are figures of the result, too: in its file if that stays small with them.
     ///
     /// # Errors
     /// The file system's.
     pub fn store(&mut self, name: &str, data: &Value) -> io::Result<()> {
         self.run.figures.insert(name.to_owned(), data.clone());
-        fs::write(self.folder().join(name), format!("{data:#}\n"))
+        self.store_text(name, &format!("{data:#}\n"))
     }
 
     /// Stores raw data as text.
@@ -85,7 +113,8 @@ impl Archive {
     /// # Errors
     /// The file system's.
     pub fn store_text(&self, name: &str, text: &str) -> io::Result<()> {
-        fs::write(self.folder().join(name), text)
+        self.folder()
+            .map_or(Ok(()), |folder| fs::write(folder.join(name), text))
     }
 
     /// Stores a page beside the raw data; where it lies is said at the end.
@@ -121,7 +150,10 @@ impl Archive {
 
     /// Adds lines to the summary, and shows them.
     pub fn say(&mut self, lines: &str) {
-        println!("{lines}");
+        match self.outlet {
+            Outlet::Files => println!("{lines}"),
+            Outlet::Json => eprintln!("{lines}"),
+        }
         self.add(lines);
     }
 
@@ -139,7 +171,7 @@ impl Archive {
         figures: &[(impl AsRef<str>, Value)],
         lines: &[String],
     ) -> io::Result<()> {
-        let mut archive = Self::new(question)?;
+        let mut archive = Self::new(question, Outlet::Files)?;
         for (name, found) in figures {
             archive.store(name.as_ref(), found)?;
         }
@@ -147,18 +179,22 @@ impl Archive {
         archive.close()
     }
 
-    /// Writes the result, and says where it and the raw data lie.
+    /// Writes the result, and says where it and the raw data lie; or prints it.
     ///
     /// # Errors
-    /// The file system's.
+    /// The file system's; output that cannot be written.
     pub fn close(mut self) -> io::Result<()> {
         let summary = self.run.summary.join("\n");
         self.store_text("summary.md", &format!("{summary}\n"))?;
-        self.run.raw = Raw::list(&self.folder())?;
+        let Some(raw) = self.folder() else {
+            return json(&self.run);
+        };
+        self.run.raw = Raw::list(&raw)?;
         let Self {
             mut run,
             host,
             pages,
+            ..
         } = self;
         run.shrink();
         let folder = format!("{RESULTS}/{}-{host}", run.date);

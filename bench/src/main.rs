@@ -9,7 +9,8 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use vigil_bench::results::{self, ResultFile};
-use vigil_bench::{archive, chain, latency::flood as sensor_flood};
+use vigil_bench::{archive, chain, latency::flood as sensor_flood, root};
+use vigil_terminal::schema;
 
 use questions::*;
 
@@ -70,7 +71,7 @@ enum Question {
     TapedWheels,
     /// How much of a core does `vigil top` take?
     Top(top::Args),
-    /// Writes bench/README.md anew from the results
+    /// Writes bench/README.md anew from the results, and bench/result.schema.json
     Page,
     #[command(flatten)]
     Role(Role),
@@ -125,12 +126,12 @@ impl Role {
     }
 }
 
-/// Writes the page of results.
+/// Writes the page of results, and the schema of one.
 fn write_page() -> Result<(), Box<dyn Error>> {
-    let folder = archive::results();
-    let page = results::page(&ResultFile::all(&folder)?);
-    std::fs::write(folder.with_file_name("README.md"), page)?;
-    Ok(())
+    let page = results::page(&ResultFile::all(&archive::results())?);
+    let bench = root().join("bench");
+    std::fs::write(bench.join("README.md"), page)?;
+    Ok(schema::write(&[results::SCHEMA], &bench)?)
 }
 
 fn main() -> ExitCode {

@@ -28,8 +28,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use serde_json::{Value, json};
-use vigil_bench::archive::Archive;
-use vigil_bench::machine;
+use vigil_bench::archive::{Archive, Outlet};
 use vigil_bench::variation::{Comparison, say_comparisons, without_lead};
 use vigil_evaluation::parallel::at_once;
 use vigil_missions::learning::{Record, file};
@@ -52,7 +51,7 @@ pub struct MissionArgs {
     /// Compare Vigil and rules in each variation of `bench/variations.toml` instead.
     #[arg(long, conflicts_with = "sweep")]
     vary: bool,
-    /// Print one JSON document, archive nothing.
+    /// Print the result as one JSON document, archive nothing.
     #[arg(long)]
     json: bool,
 }
@@ -66,8 +65,8 @@ impl MissionArgs {
         }
     }
 
-    /// Prints the document as JSON, or archives it with the lines of its missions, if there are
-    /// any, and what `say` says of it.
+    /// Archives the document with the lines of its missions, if there are any, and what `say` says
+    /// of it; or prints it.
     fn keep(
         &self,
         question: &str,
@@ -76,13 +75,8 @@ impl MissionArgs {
         lines: Option<String>,
         say: impl FnOnce(&mut Archive),
     ) -> Result<(), Box<dyn Error>> {
-        document["machine"] = machine::facts();
         document["wall_s"] = json!(began.elapsed().as_secs_f64());
-        if self.json {
-            println!("{document:#}");
-            return Ok(());
-        }
-        let mut archive = Archive::new(question)?;
+        let mut archive = Archive::new(question, Outlet::of(self.json))?;
         archive.store(&format!("{question}.json"), &document)?;
         if let Some(lines) = lines {
             archive.store_text(&format!("{question}.csv"), &lines)?;

@@ -8,8 +8,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crc32fast::Hasher;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
+use vigil_terminal::schema::CommandSchema;
 
 pub use page::page;
 use shorten::shortened;
@@ -23,8 +25,11 @@ const BYTES_AROUND_A_LINE: usize = 4;
 /// Room for the remark that a summary was shortened, bytes.
 const BYTES_OF_A_REMARK: usize = 120;
 
+/// What a question prints with `--json`, and what its file holds.
+pub const SCHEMA: CommandSchema = CommandSchema::new::<Run>("result.schema");
+
 /// One measurement.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Run {
     /// Version of the file's form.
@@ -50,7 +55,7 @@ pub struct Run {
 }
 
 /// A raw file, or a folder of them.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Raw {
     /// Its name; that of a folder ends with `/`.
@@ -206,6 +211,8 @@ impl ResultFile {
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use vigil_terminal::schema::outdated;
+
     use super::*;
 
     /// A result of a question, nothing in it.
@@ -222,6 +229,14 @@ pub(crate) mod tests {
             figures: Map::new(),
             raw: Vec::new(),
         }
+    }
+
+    #[test]
+    fn the_schema_beside_the_results_is_up_to_date() {
+        let folder = crate::root().join("bench");
+        let hint = "write it anew: scripts/bench page";
+        assert_eq!(outdated(&[SCHEMA], &folder), [""; 0], "{hint}");
+        assert_eq!(SCHEMA.unexplained_keys(), [""; 0]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use serde_json::Value;
+use vigil_bench::results::Run;
 
 #[test]
 fn each_state_is_measured_against_the_same_rounds_without_a_black_box() {
@@ -26,7 +26,9 @@ fn each_state_is_measured_against_the_same_rounds_without_a_black_box() {
         .output()
         .expect("the program starts");
     assert!(output.status.success(), "{output:?}");
-    let document: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let run: Run = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(run.raw.is_empty(), "nothing is archived: {:?}", run.raw);
+    let document = &run.figures["blackbox.json"];
     for state in ["off", "on", "stopped", "killed"] {
         let found = &document["states"][state];
         // One instant a period.

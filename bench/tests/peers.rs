@@ -3,8 +3,15 @@
 use std::process::Command;
 
 use serde_json::Value;
+use vigil_bench::results::Run;
 
 const CARRIERS: [&str; 5] = ["futex", "shared-memory", "datagram", "pipe", "queue"];
+
+/// The rows of a result.
+fn rows(printed: &[u8]) -> Vec<Value> {
+    let mut run: Run = serde_json::from_slice(printed).unwrap();
+    serde_json::from_value(run.figures["peers.json"].take()).unwrap()
+}
 
 #[test]
 fn every_carrier_hands_blocks_through_four_stages() {
@@ -15,7 +22,7 @@ fn every_carrier_hands_blocks_through_four_stages() {
         .output()
         .expect("the program starts");
     assert!(output.status.success(), "{output:?}");
-    let rows: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
+    let rows = rows(&output.stdout);
     let carriers: Vec<&str> = rows.iter().filter_map(|r| r["carrier"].as_str()).collect();
     assert_eq!(carriers, CARRIERS);
     for row in &rows {
@@ -38,7 +45,7 @@ fn what_a_carrier_cannot_do_is_a_row_with_its_reason() {
         .args(["--bytes", "1000", "--load", "idle", "--json"])
         .output()
         .expect("the program starts");
-    let rows: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
+    let rows = rows(&output.stdout);
     let shared = rows.iter().find(|row| row["carrier"] == "shared-memory");
     let failed = shared.unwrap()["failed"].as_str().unwrap();
     assert!(failed.contains("no block of 1000 bytes"), "{failed}");

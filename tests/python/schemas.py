@@ -20,9 +20,9 @@ def closed(schema):
     return schema
 
 
-def problems(name, *documents):
+def problems(name, *documents, folder=SCHEMAS):
     """Where the documents are not what the schema of this name says, and nothing else."""
-    schema = json.loads((SCHEMAS / f"{name}.json").read_text())
+    schema = json.loads((folder / f"{name}.json").read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
     validator = jsonschema.Draft202012Validator(closed(schema))
     errors = [error for document in documents for error in validator.iter_errors(document)]

@@ -10,7 +10,7 @@ import subprocess
 import tempfile
 import unittest
 
-from harness import BINARIES, FRAMES, Graph, vigil, wait_for
+from harness import BINARIES, FRAMES, ROOT, Graph, vigil, wait_for
 from schemas import SCHEMAS, problems
 
 
@@ -248,6 +248,15 @@ class Published(unittest.TestCase):
             self.assertEqual(vigil("schema", name).stdout, (SCHEMAS / f"{name}.json").read_text())
         unknown = vigil("schema", "pomdp")
         self.assertEqual((unknown.returncode, "there are: run, " in unknown.stderr), (2, True))
+
+    def test_what_was_measured_is_as_its_schema_says(self):
+        bench = ROOT / "bench"
+        said = subprocess.run([BINARIES / "vigil-bench", "size", "--json"], capture_output=True, text=True, cwd=ROOT)
+        self.assertEqual(said.returncode, 0, said.stderr)
+        kept = [path.read_text() for path in sorted((bench / "results").rglob("*.json"))]
+        results = [json.loads(text) for text in [said.stdout, *kept]]
+        self.assertGreater(len(results), 10)
+        self.assertEqual(problems("result.schema", *results, folder=bench), [])
 
     def test_all_schemas_are_written_by_one_command(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -182,6 +182,7 @@ fn every_form_of_the_detector_and_other_graphs_go_on_from_their_state() {
 fn a_model_of_channels_goes_on_from_its_state() {
     let drive = Drive {
         config: "kobuki.toml",
+        inject: &["stuck:L@30"],
         unrecorded: 900,
         ..ROVER
     };
@@ -259,9 +260,11 @@ fn restarts_a_new_publisher_and_blindness_are_computed_again() {
         2500 => Hiccup::Ordered(ControlCommand::Forget),
         _ => now_and_then(k),
     };
-    for config in ["rover.toml", "kobuki.toml"] {
+    let kobuki: &[&str] = &["stuck:L@30"];
+    for (config, inject) in [("rover.toml", ROVER.inject), ("kobuki.toml", kobuki)] {
         let drive = Drive {
             config,
+            inject,
             hiccup,
             ..ROVER
         };

@@ -1,6 +1,7 @@
 //! The graph in one thread under the virtual clock, whose services may be dead for a while.
 #![allow(dead_code)]
 
+pub mod kobuki;
 mod publisher;
 
 use std::path::{Path, PathBuf};
@@ -14,21 +15,15 @@ use vigil_cycle::{
 use vigil_detector::DetectorStage;
 use vigil_identifier::IdentifierStage;
 use vigil_setup::graph_file::GraphFile;
-use vigil_setup::{Document, GraphArgs, Setup};
+use vigil_setup::{Document, Setup};
 use vigil_supervisor::SupervisorStage;
 
 pub use publisher::Publisher;
 
 /// The configuration of this name with a change, as a file of its own.
 pub fn document(config: &str, change: impl FnOnce(&mut GraphFile)) -> Document {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..");
-    let args = GraphArgs {
-        config: root.join("config").join(config),
-        ..GraphArgs::default()
-    };
-    let mut document = args.read().unwrap();
-    change(&mut document.file);
-    document
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../config");
+    Document::read(&folder.join(config), change).unwrap()
 }
 
 fn account(setup: &Setup, graph: &Graph, name: ServiceName) -> CycleAccount {

@@ -91,13 +91,19 @@ impl<'a> Outcome<'a> {
             .figures
             .iter()
             .map(|figure| (figure.name.to_owned(), json!(figure)));
-        json!({
+        let mut document = json!({
             "scenario": self.scenario.name, "about": self.scenario.about,
             "sensors": self.sensors, "runs": self.runs.len(), "hours": self.hours(),
             "first_seed": self.scenario.first_seed,
             "figures": figures.collect::<serde_json::Map<_, _>>(),
             "bars": bars.collect::<Vec<Value>>(),
-        })
+        });
+        // Where the question is how often something is told, when and what is the answer.
+        if self.bars().any(|(bar, _)| bar.figure == "activations_most") {
+            let told = self.runs.iter().map(|run| json!([run.seed, run.told]));
+            document["told"] = told.collect();
+        }
+        document
     }
 
     /// The bars that are not met, one by line with the figure.
@@ -231,7 +237,7 @@ pub fn barred_lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
 
 /// Everything as data.
 #[must_use]
-pub fn document(outcomes: &[Outcome<'_>], machine: Value, wall_s: f64, scale: f64) -> Value {
+pub fn document(outcomes: &[Outcome<'_>], wall_s: f64, scale: f64) -> Value {
     let met: Vec<Option<bool>> = outcomes
         .iter()
         .flat_map(|o| o.bars().map(|(_, met)| met))
@@ -239,7 +245,7 @@ pub fn document(outcomes: &[Outcome<'_>], machine: Value, wall_s: f64, scale: f6
     let (bars, without) = (met.iter().flatten(), met.iter().filter(|met| met.is_none()));
     let results: Vec<Value> = outcomes.iter().map(Outcome::json).collect();
     json!({
-        "schema_version": 1, "machine": machine, "wall_s": wall_s, "scale": scale,
+        "wall_s": wall_s, "scale": scale,
         "bars": bars.clone().count(), "bars_met": bars.filter(|met| **met).count(),
         "bars_without_case": without.count(), "results": results,
     })

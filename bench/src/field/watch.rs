@@ -1,15 +1,16 @@
 //! The stages of a run, scored.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::error::Error;
 
 use vigil_blocks::{FaultRecord, FaultSource, FaultState, Readiness, SensorFrame};
 use vigil_decision::{FaultLife, LifeInput};
 use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Verdict;
-use vigil_evaluation::scoring::field::{Run, Scorer};
+use vigil_evaluation::scoring::field::{Run, Scorer, Told};
 use vigil_evaluation::stages::Stages;
-use vigil_setup::Setup;
+use vigil_robot::FaultTree;
+use vigil_setup::{Setup, fault_name};
 
 use super::timeline::Timeline;
 use crate::simulated::stages;
@@ -25,8 +26,10 @@ pub(super) struct Watch<'a> {
 /// What an operator is told of the robot's faults.
 struct ToldFaults {
     life: FaultLife,
-    /// By number, how often each of the robot became active.
-    activations: BTreeMap<u64, u32>,
+    /// Names of faults.
+    tree: FaultTree,
+    /// Changes, in order.
+    told: Vec<Told>,
     /// The robot's that were pending at some time, by number.
     pending: BTreeSet<u64>,
     /// When the alarm stood last, s.
@@ -59,7 +62,13 @@ impl ToldFaults {
         while let Some(record) = self.life.take_change() {
             // That frames are missing is for other figures.
             if record.source == FaultSource::Robot as u32 {
-                self.activations.insert(record.number, record.count);
+                self.told.push(Told {
+                    t_s,
+                    number: record.number,
+                    fault: fault_name(&self.tree, record.source, record.what).to_owned(),
+                    state: record.state().map_or("?", FaultState::name),
+                    count: record.count,
+                });
                 let is_new = record.state() == Some(FaultState::Active);
                 let has_alarm = t_s - self.alarm_t_s <= FALLEN_S;
                 self.without_alarm += usize::from(is_new && !has_alarm);
@@ -69,8 +78,8 @@ impl ToldFaults {
 
     /// Faults of the robot that were gone before they were told of.
     fn pending_alone(&self) -> usize {
-        let is_told = |number: &&u64| self.activations.contains_key(*number);
-        self.pending.len() - self.pending.iter().filter(is_told).count()
+        let told: BTreeSet<u64> = self.told.iter().map(|change| change.number).collect();
+        self.pending.difference(&told).count()
     }
 }
 
@@ -92,7 +101,8 @@ impl<'a> Watch<'a> {
             timeline: None,
             told: ToldFaults {
                 life: vigil_supervisor::fault_life(setup)?,
-                activations: BTreeMap::new(),
+                tree: setup.tree.clone(),
+                told: Vec::new(),
                 pending: BTreeSet::new(),
                 alarm_t_s: f64::NEG_INFINITY,
                 without_alarm: 0,
@@ -103,10 +113,9 @@ impl<'a> Watch<'a> {
     /// The score.
     pub(super) fn finish(self) -> Run {
         Run {
-            faults_told: self.told.activations.len(),
             told_without_alarm: self.told.without_alarm,
             faults_pending: self.told.pending_alone(),
-            activations: self.told.activations.values().sum::<u32>() as usize,
+            told: self.told.told,
             ..self.scorer.finish()
         }
     }

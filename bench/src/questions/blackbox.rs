@@ -5,9 +5,8 @@
 
 use std::error::Error;
 
-use vigil_bench::archive::Archive;
+use vigil_bench::archive::{Archive, Outlet};
 use vigil_bench::blackbox::{Plan, document, table};
-use vigil_bench::machine;
 
 /// Shortest half, s.
 const SECONDS_MIN: f64 = 1.0;
@@ -24,7 +23,7 @@ pub struct Args {
     /// Rounds of all states.
     #[arg(long, value_name = "N", default_value_t = 12)]
     rounds: usize,
-    /// Print one JSON document, archive nothing.
+    /// Print the result as one JSON document, archive nothing.
     #[arg(long)]
     json: bool,
 }
@@ -46,14 +45,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         rounds,
     };
     let run = vigil_bench::in_folder("blackbox", |folder| plan.run(folder))?;
-    let mut document = document(&plan, &run);
-    if args.json {
-        document["machine"] = machine::facts();
-        eprintln!("{}", table(&run).join("\n"));
-        println!("{document:#}");
-        return Ok(());
-    }
-    let mut archive = Archive::new("blackbox")?;
+    let mut archive = Archive::new("blackbox", Outlet::of(args.json))?;
     archive.say(&format!(
         "One graph of the rover at {} Hz, {rounds} rounds of four times {seconds} s: without a \
          black box, with one, with one that is stopped (SIGSTOP), and with one that is killed \
@@ -72,7 +64,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         args.rate
     ));
     table(&run).iter().for_each(|line| archive.say(line));
-    archive.store("blackbox.json", &document)?;
+    archive.store("blackbox.json", &document(&plan, &run))?;
     archive.close()?;
     Ok(())
 }

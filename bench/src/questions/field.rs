@@ -10,13 +10,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use serde_json::{Value, json};
-use vigil_bench::archive::Archive;
+use vigil_bench::archive::{Archive, Outlet};
 use vigil_bench::field::{
     self, File, Graph, Job, Library, Outcome, Scenario, ScoredRun, barred_lines, document, jobs,
     library, lines, select,
 };
-use vigil_bench::{machine, root};
+use vigil_bench::root;
 use vigil_evaluation::parallel::in_parallel;
+use vigil_terminal::output;
 
 /// Does the diagnosis hold in the field?
 #[derive(Debug, clap::Args)]
@@ -33,7 +34,7 @@ pub struct Args {
     /// Only say which scenarios there are.
     #[arg(long)]
     list: bool,
-    /// Print one JSON document.
+    /// Print the result as one JSON document, archive nothing.
     #[arg(long)]
     json: bool,
     /// Also keep what every run brought.
@@ -60,7 +61,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let scenarios = select(&file, &args.only)?;
     if args.list {
         for scenario in scenarios {
-            println!("{}: {}", scenario.name, scenario.about);
+            output::line(&format!("{}: {}", scenario.name, scenario.about))?;
         }
         return Ok(());
     }
@@ -73,17 +74,14 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     }
     let outcomes = measure(&graph, &library, &scenarios, &all)?;
     let wall_s = began.elapsed().as_secs_f64();
-    let document = document(&outcomes, machine::facts(), wall_s, args.scale);
+    let document = document(&outcomes, wall_s, args.scale);
     // What never happened meets nothing, nor does what could not be driven.
     let is_whole = scenarios
         .iter()
         .all(|scenario| outcomes.iter().any(|o| o.scenario.name == scenario.name));
     let mut bars = outcomes.iter().flat_map(Outcome::bars);
     let is_met = is_whole && bars.all(|(_, met)| met == Some(true));
-    match args.json {
-        true => println!("{document:#}"),
-        false => show(args, &outcomes, &document)?,
-    }
+    show(args, &outcomes, &document)?;
     if args.check && !is_met {
         return Err("a bar is not met".into());
     }
@@ -102,7 +100,7 @@ fn show(args: &Args, outcomes: &[Outcome<'_>], document: &Value) -> Result<(), B
         document["bars_without_case"],
         document["wall_s"].as_f64().unwrap_or(f64::NAN)
     );
-    if !(is_whole || args.archive) {
+    if !(is_whole || args.archive || args.json) {
         lines(outcomes).iter().for_each(|line| println!("{line}"));
         println!("\n{last}\nNot archived: only a part was measured.");
         return Ok(());
@@ -110,7 +108,7 @@ fn show(args: &Args, outcomes: &[Outcome<'_>], document: &Value) -> Result<(), B
     // A part has a name of its own, so that it does not stand for the whole.
     let parts = args.only.iter().map(|name| name.replace('/', "-"));
     let words: Vec<String> = iter::once("field".to_owned()).chain(parts).collect();
-    let mut archive = Archive::new(&words.join("-"))?;
+    let mut archive = Archive::new(&words.join("-"), Outlet::of(args.json))?;
     archive.store("field.json", document)?;
     let table = lines(outcomes);
     archive.store_text("table.md", &format!("{}\n", table.join("\n")))?;

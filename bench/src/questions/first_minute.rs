@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use serde_json::{Value, json};
-use vigil_bench::archive::Archive;
+use vigil_bench::archive::{Archive, Outlet};
 
 /// The README's first command.
 const OPTIONS: [&str; 4] = ["--duration", "15", "--inject", "stuck:RM@5"];
@@ -25,7 +25,7 @@ pub fn run() -> Result<(), Box<dyn Error>> {
 }
 
 fn measure(clone: &Path) -> Result<(), Box<dyn Error>> {
-    let mut archive = Archive::new("first-minute")?;
+    let mut archive = Archive::new("first-minute", Outlet::Files)?;
     let began = Instant::now();
     let mut up = Command::new(clone.join("scripts/up"))
         .args(OPTIONS)

@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 
 use serde::Deserialize;
 use serde_json::json;
-use vigil_bench::archive::Archive;
+use vigil_bench::archive::{Archive, Outlet};
 use vigil_bench::simulated;
 use vigil_blocks::SensorFrame;
 use vigil_robot::Injection;
@@ -105,7 +105,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if args.check {
         println!("{head}\n{}", lines.join("\n"));
     } else {
-        let mut archive = Archive::new("instructions")?;
+        let mut archive = Archive::new("instructions", Outlet::Files)?;
         archive.say(&format!(
             "`scripts/bench instructions`: the mean of {CYCLES} steps at 100 Hz, a wheel sticks \
              half way; by callgrind. Profile: {profile}.\n\n{head}"

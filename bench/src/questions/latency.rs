@@ -8,7 +8,7 @@ use std::path::Path;
 
 use clap::ValueEnum as _;
 use serde_json::Value;
-use vigil_bench::archive::Archive;
+use vigil_bench::archive::{Archive, Outlet};
 use vigil_bench::latency::cell::{Cell, Scheduling, Spec};
 use vigil_bench::latency::load::Load;
 use vigil_bench::latency::page::{ABOUT, CellFigures, HEADS, LatencyPage};
@@ -50,7 +50,7 @@ pub struct Args {
     /// `latency-CELL`, or `latency-cells` for several.
     #[arg(long, value_name = "NAME")]
     archive: Option<String>,
-    /// Print one JSON document of one cell, archive nothing.
+    /// Print the result as one JSON document, archive nothing.
     #[arg(long)]
     json: bool,
 }
@@ -65,13 +65,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         .into());
     }
     let specs = specs(args);
-    vigil_bench::in_folder("latency", |folder| {
-        if args.json {
-            print_one(&specs, folder)
-        } else {
-            archive(args, &specs, folder)
-        }
-    })
+    vigil_bench::in_folder("latency", |folder| archive(args, &specs, folder))
 }
 
 /// True if no cell was chosen.
@@ -130,17 +124,8 @@ const fn or<'a, T>(given: &'a [T], otherwise: &'a [T]) -> &'a [T] {
     if given.is_empty() { otherwise } else { given }
 }
 
-fn print_one(specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
-    let [spec] = specs else {
-        return Err("--json measures one cell: give one --rate, --load and --scheduling".into());
-    };
-    let document = spec.run(folder)?.json();
-    println!("{document:#}");
-    Ok(())
-}
-
 fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
-    let mut archive = Archive::new(&archive_name(args, specs))?;
+    let mut archive = Archive::new(&archive_name(args, specs), Outlet::of(args.json))?;
     archive.say(&format!("{ABOUT}\n"));
     archive.say(&format!(
         "| {} |\n|{}",
@@ -156,8 +141,10 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
         eprintln!("{} of {}: {}", i + 1, specs.len(), spec.name());
         let row = match spec.run(folder) {
             Ok(cell) => {
-                let name = format!("{:02}-{}", i + 1, spec.name());
-                files::write(&cell, &archive.folder().join(name))?;
+                if let Some(raw) = archive.folder() {
+                    let name = format!("{:02}-{}", i + 1, spec.name());
+                    files::write(&cell, &raw.join(name))?;
+                }
                 cells.push(cell.json());
                 let run = (args.repeat > 1).then_some(i % args.repeat + 1);
                 page.cells.push(CellFigures::new(&cell, run));

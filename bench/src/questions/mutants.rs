@@ -16,7 +16,7 @@ use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
 use serde::Deserialize;
 use serde_json::json;
-use vigil_bench::archive::Archive;
+use vigil_bench::archive::{Archive, Outlet};
 
 /// Packages whose lines decide what Vigil says.
 const PACKAGES: [&str; 4] = [
@@ -127,7 +127,7 @@ fn measure(args: &Args, clone: &Path) -> Result<(), Box<dyn Error>> {
             return Err(format!("the tests of {package} fail without any mutant").into());
         }
     }
-    let mut archive = Archive::new("mutants")?;
+    let mut archive = Archive::new("mutants", Outlet::Files)?;
     let mut trials: Vec<Trial> = Vec::new();
     let mut viable = 0;
     for mutant in mutants {

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use clap::ValueEnum;
 use serde_json::{Value, json};
-use vigil_bench::archive::Archive;
+use vigil_bench::archive::{Archive, Outlet};
 use vigil_bench::chain::carriers::Carrier;
 use vigil_bench::chain::{Chain, STAGES};
 use vigil_bench::latency::cell::us;
@@ -39,7 +39,7 @@ pub struct Args {
     /// Load beside them.
     #[arg(long, default_value = "keep-awake")]
     load: Load,
-    /// Print one JSON document, archive nothing.
+    /// Print the result as one JSON document, archive nothing.
     #[arg(long)]
     json: bool,
 }
@@ -55,10 +55,6 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         let _load = LoadProcess::start(args.load, &cores, folder, None)?;
         measure(args, folder)
     })?;
-    if args.json {
-        println!("{:#}", Value::from(rows));
-        return Ok(());
-    }
     archive(args, &rows)
 }
 
@@ -113,7 +109,7 @@ fn one(chain: &Chain, round: usize, folder: &Path) -> Value {
 }
 
 fn archive(args: &Args, rows: &[Value]) -> Result<(), Box<dyn Error>> {
-    let mut archive = Archive::new("peers")?;
+    let mut archive = Archive::new("peers", Outlet::of(args.json))?;
     let (rate, seconds, load) = (args.rate, args.seconds, args.load.name());
     let rounds = args.rounds;
     archive.say(&format!(

@@ -8,10 +8,10 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::{Value, json};
-use vigil_bench::archive::Archive;
+use vigil_bench::archive::{Archive, Outlet};
 use vigil_bench::latency::graph::{Change, GraphFile};
 use vigil_bench::launched::Launched;
-use vigil_bench::{machine, program};
+use vigil_bench::program;
 use vigil_robot::FaultTree;
 
 /// Least factor at which it is to be computed.
@@ -40,20 +40,15 @@ const FAULTS: [&str; 9] = [
 /// Measures how a recording is computed again.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Print one JSON document, archive nothing.
+    /// Print the result as one JSON document, archive nothing.
     #[arg(long)]
     json: bool,
 }
 
 /// Answers the question.
 pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
-    let mut document = vigil_bench::in_folder("replay", measure)?;
-    if args.json {
-        document["machine"] = machine::facts();
-        println!("{document:#}");
-    } else {
-        archive(&document)?;
-    }
+    let document = vigil_bench::in_folder("replay", measure)?;
+    archive(&document, Outlet::of(args.json))?;
     match document["is_met"] == true {
         true => Ok(()),
         false => Err("too few faults, or not computed again as it was, or too slowly".into()),
@@ -131,8 +126,8 @@ fn told(summary: &Value, tree: &FaultTree) -> usize {
     numbers.len()
 }
 
-fn archive(document: &Value) -> Result<(), Box<dyn Error>> {
-    let mut archive = Archive::new("replay")?;
+fn archive(document: &Value, outlet: Outlet) -> Result<(), Box<dyn Error>> {
+    let mut archive = Archive::new("replay", outlet)?;
     let replay = &document["replay"];
     archive.say(&format!(
         "The rover's graph at {RATE_HZ} Hz for {} s, with five faults injected; {} were told. The \

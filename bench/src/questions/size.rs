@@ -6,8 +6,9 @@ use std::collections::BTreeMap;
 use std::error::Error;
 
 use serde_json::{Value, json};
-use vigil_bench::archive::Archive;
+use vigil_bench::archive::{Archive, Outlet};
 use vigil_size::{Lines, Size, linked_crates, measure, workspace};
+use vigil_terminal::output;
 
 /// Bars in lines of code: rooms that ship, what runs on the robot, measuring.
 const SHIPPED_MAX: usize = 45_000;
@@ -17,7 +18,7 @@ const BENCH_MAX: usize = 6_000;
 /// What is done with the counts.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Print one JSON document instead of tables
+    /// Print the result as one JSON document, archive nothing.
     #[arg(long, conflicts_with = "archive")]
     json: bool,
     /// Keep the result in bench/results
@@ -28,16 +29,11 @@ pub struct Args {
 /// Answers the question.
 pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let size = measure(&workspace()?, &linked_crates()?);
-    if args.json {
-        println!("{:#}", figures(&size));
-        return Ok(());
-    }
     let text = tables(&size).join("\n");
-    if !args.archive {
-        println!("{text}");
-        return Ok(());
+    if !(args.archive || args.json) {
+        return Ok(output::line(&text)?);
     }
-    let mut archive = Archive::new("size")?;
+    let mut archive = Archive::new("size", Outlet::of(args.json))?;
     archive.say(&text);
     archive.store("size.json", &figures(&size))?;
     archive.close()?;
@@ -128,7 +124,6 @@ fn tables(size: &Size) -> Vec<String> {
 
 fn figures(size: &Size) -> Value {
     json!({
-        "schema_version": 1,
         "shipped": shipped(size).code,
         "linked": linked(size),
         "bench": bench(size),

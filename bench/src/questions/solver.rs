@@ -8,7 +8,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use vigil_bench::archive::Archive;
+use vigil_bench::archive::{Archive, Outlet};
 use vigil_bench::root;
 use vigil_cycle::clock::process_cpu_s;
 use vigil_missions::simulation::{Episode, PolicyAgent, Rules, Summary, run as drive};
@@ -123,7 +123,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         eprintln!("{name}: {} of {}", found.len() + 1, models.len());
         found.push(measure(args, name, model)?);
     }
-    let mut archive = Archive::new("solver")?;
+    let mut archive = Archive::new("solver", Outlet::Files)?;
     archive.store(
         "solver.json",
         &found.iter().map(Measurement::json).collect(),

@@ -10,10 +10,9 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use vigil_bench::archive::Archive;
+use vigil_bench::archive::{Archive, Outlet};
 use vigil_bench::latency::graph::{Change, GraphFile};
 use vigil_bench::launched::Launched;
-use vigil_bench::machine;
 use vigil_bench::process_time::{children, cpu_s};
 use vigil_bench::program;
 use vigil_cycle::signal;
@@ -35,7 +34,7 @@ pub struct Args {
     /// Time to measure, s.
     #[arg(long, value_name = "S", default_value_t = 60.0)]
     seconds: f64,
-    /// Print one JSON document, archive nothing.
+    /// Print the result as one JSON document, archive nothing.
     #[arg(long)]
     json: bool,
 }
@@ -96,27 +95,22 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if seconds.is_nan() || seconds < 1.0 {
         return Err(format!("--seconds {seconds}: allowed is 1 or more").into());
     }
-    let mut document = vigil_bench::in_folder("top", |folder| measure(seconds, folder))?;
+    let document = vigil_bench::in_folder("top", |folder| measure(seconds, folder))?;
     let percent = document["percent_of_a_core"].as_f64().unwrap_or_default();
-    if args.json {
-        document["machine"] = machine::facts();
-        println!("{document:#}");
-    } else {
-        let mut archive = Archive::new("top")?;
-        archive.say(&format!(
-            "`vigil top` beside a graph at {RATE_HZ} Hz, on a terminal of 120 columns and 40 \
-             lines, for {seconds} s: {percent:.2} % of a core; it wrote {} bytes a second. Bar: at \
-             most {PERCENT_MAX} %: {}.",
-            document["bytes_a_second"],
-            if document["is_met"] == true {
-                "met"
-            } else {
-                "missed"
-            },
-        ));
-        archive.store("top.json", &document)?;
-        archive.close()?;
-    }
+    let mut archive = Archive::new("top", Outlet::of(args.json))?;
+    archive.say(&format!(
+        "`vigil top` beside a graph at {RATE_HZ} Hz, on a terminal of 120 columns and 40 lines, \
+         for {seconds} s: {percent:.2} % of a core; it wrote {} bytes a second. Bar: at most \
+         {PERCENT_MAX} %: {}.",
+        document["bytes_a_second"],
+        if document["is_met"] == true {
+            "met"
+        } else {
+            "missed"
+        },
+    ));
+    archive.store("top.json", &document)?;
+    archive.close()?;
     match document["is_met"] == true {
         true => Ok(()),
         false => Err("it takes more of a core than it may".into()),

@@ -71,6 +71,14 @@ impl RunWriter {
         self.counts
     }
 
+    /// The last frame that was written: its run as the table numbers it, and its time in it, s.
+    #[must_use]
+    pub fn last(&self) -> Option<(u32, f64)> {
+        let run = self.run.as_ref()?;
+        let t_s = (run.last_ns - run.from_ns) as f64 * 1e-9;
+        Some((self.counts.runs - 1, t_s))
+    }
+
     /// Writes a frame.
     ///
     /// # Errors

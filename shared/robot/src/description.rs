@@ -362,11 +362,20 @@ impl Description {
         self.wheels.iter().position(|wheel| wheel.name == name)
     }
 
-    /// An action's name, and the wheels that it is about after a colon: `limp_home:LF+RM`.
+    /// An action's name, and the wheels that it is about after a colon: `limp_home:LF+RM`. Where
+    /// some are stuck, those of broken encoders are marked: `limp_home:LF_ENC+RM`.
     #[must_use]
     pub fn action_text(&self, action: &str, wheels: AnsweredWheels) -> String {
-        let name = |wheel: usize| self.wheels.get(wheel).map(|it| it.name.as_str());
-        let names: Vec<&str> = wheels.wheels().filter_map(name).collect();
+        let is_mixed = wheels.stuck != 0 && wheels.encoders != 0;
+        let name = |wheel: usize| {
+            let name = &self.wheels.get(wheel)?.name;
+            let is_encoder = wheels.encoders >> wheel & 1 == 1;
+            Some(match is_mixed && is_encoder {
+                true => format!("{name}_ENC"),
+                false => name.clone(),
+            })
+        };
+        let names: Vec<String> = wheels.wheels().filter_map(name).collect();
         match names.is_empty() {
             true => action.to_owned(),
             false => format!("{action}:{}", names.join("+")),

@@ -1,5 +1,7 @@
 //! The kinds of disturbance: names, places, parameters, wire codes.
 
+use strum::EnumMessage;
+
 use crate::description::Description;
 
 /// Parameters that a disturbance has at most.
@@ -8,7 +10,7 @@ pub const PARAMETERS: usize = 2;
 const FIRST_CODE: u32 = 101;
 
 /// What a disturbance does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, EnumMessage)]
 #[repr(u32)]
 pub enum DisturbanceKind {
     /// A steering servo slips: the wheel and its sensor turn by an angle, rad.
@@ -69,7 +71,7 @@ pub enum DisturbanceKind {
     PoseHeld,
     /// The gyro's noise is so many times the usual.
     GyroNoise,
-    /// That of a wheel's current sensor is.
+    /// The noise of a wheel's current sensor is so many times the usual.
     CurrentNoise,
 }
 
@@ -258,6 +260,15 @@ impl DisturbanceSpec {
             units.concat(),
             "]".repeat(units.len())
         )
+    }
+
+    /// What it does, and what its parameters are if none are given.
+    #[must_use]
+    pub fn meaning(&self) -> String {
+        let about = self.kind.get_documentation().unwrap_or_default();
+        let values = self.parameters.iter().map(|it| it.default.to_string());
+        let values: Vec<String> = values.collect();
+        format!("{about} Default: {}.", values.join(", "))
     }
 
     /// Name of the place with this index; `None` for the whole rover.

@@ -7,7 +7,7 @@ use vigil_blocks::Event;
 
 use crate::description::Description;
 use crate::disturbance::Disturbance;
-use crate::disturbance_kind::{DisturbanceKind, DisturbanceSpec, KINDS, PARAMETERS};
+use crate::disturbance_kind::{DisturbanceKind, KINDS, PARAMETERS};
 use crate::fault::{Fault, FaultError, FaultKind};
 
 /// A change of the simulated robot's health.
@@ -48,14 +48,25 @@ pub enum InjectionError {
     Time(String),
 }
 
-/// What can be injected, in words: of faults and disturbances, and of their end.
+/// What can be injected, faults, disturbances and their end, each with its meaning.
 #[must_use]
-pub fn forms() -> Vec<String> {
-    let faults = ["stuck:WHEEL", "encoder:WHEEL:zero|frozen|noise"];
-    let ends = ["clear:WHEEL", "clear:KIND[:PLACE]", "clear:all"];
-    let disturbances = KINDS.iter().map(DisturbanceSpec::form);
-    let faults = faults.into_iter().map(str::to_owned);
-    let ends = ends.into_iter().map(str::to_owned);
+pub fn forms() -> Vec<[String; 2]> {
+    let faults = [
+        ["stuck:WHEEL", "A wheel does not turn."],
+        [
+            "encoder:WHEEL:zero|frozen|noise",
+            "An encoder reports 0, its last rate, or noise alone.",
+        ],
+    ];
+    let ends = [
+        ["clear:WHEEL", "Ends all that is wrong with a wheel."],
+        ["clear:KIND[:PLACE]", "Ends a disturbance."],
+        ["clear:all", "Ends everything."],
+    ];
+    let owned = |texts: [&str; 2]| texts.map(str::to_owned);
+    let disturbances = KINDS.iter().map(|kind| [kind.form(), kind.meaning()]);
+    let faults = faults.into_iter().map(owned);
+    let ends = ends.into_iter().map(owned);
     faults.chain(disturbances).chain(ends).collect()
 }
 

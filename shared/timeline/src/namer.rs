@@ -112,7 +112,10 @@ impl Namer {
             EventKind::Reason => {
                 let (channel, evidence) =
                     (evidence_name(&self.robot, event.what as usize), event.p);
-                let runner_up = self.mode(event.value as u32);
+                let runner_up = match event.value as u32 {
+                    MODE_MULTIPLE => "several faults".to_owned(),
+                    fault => self.mode(fault),
+                };
                 format!("{channel} says so by {evidence:.1} nat; runner-up {runner_up}")
             }
             EventKind::Size => {
@@ -130,7 +133,10 @@ impl Namer {
                 let wire = WireChange::from_event(kind == EventKind::Injected, event);
                 Change::from_wire(&wire).map_or("?".into(), |change| change.text(&self.robot))
             }
-            EventKind::Miss => format!("{} cycles", event.value),
+            EventKind::Miss => match event.value {
+                1 => "1 cycle".into(),
+                count => format!("{count} cycles"),
+            },
             EventKind::SafeStop => match ActionRejection::from_repr(event.what) {
                 Some(ActionRejection::Nothing) => "no action".into(),
                 Some(ActionRejection::Expired) => "the action has expired".into(),

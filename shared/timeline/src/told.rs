@@ -3,10 +3,10 @@
 use crate::entry::TimelineEntry;
 
 /// Misses of a service that lie closer are told together, ns.
-const MISSES_APART_NS: u64 = 1_000_000_000;
+const MISSES_APART_NS: u64 = 10_000_000_000;
 
 /// The entries for people: without what only programs read, and misses of a service that follow
-/// each other within a second as one.
+/// each other within ten seconds as one.
 #[must_use]
 pub fn told(entries: &[TimelineEntry]) -> Vec<TimelineEntry> {
     let mut told: Vec<TimelineEntry> = Vec::new();
@@ -48,8 +48,8 @@ impl TimelineEntry {
     }
 }
 
-/// Misses while they come: the first of a service is told at once, those of the second that follows
-/// together when it is over.
+/// Misses while they come: the first of a service is told at once, those of the ten seconds that
+/// follow together when these are over.
 #[derive(Debug, Default)]
 pub struct PendingMisses(Vec<ServiceMisses>);
 
@@ -91,7 +91,7 @@ impl PendingMisses {
         }
     }
 
-    /// The misses whose second is over at `now_ns`.
+    /// The misses whose ten seconds are over at `now_ns`.
     pub fn due(&mut self, now_ns: u64) -> Vec<TimelineEntry> {
         let mut told = Vec::new();
         self.0.retain_mut(|misses| {
@@ -131,10 +131,10 @@ mod tests {
             entry(1.0, "detector", "miss"),
             entry(1.2, "identifier", "miss"),
             entry(1.5, "detector", "miss"),
-            entry(2.4, "detector", "miss"),
-            entry(4.0, "detector", "miss"),
-            entry(4.1, "detector", "alarm"),
-            entry(4.2, "detector", "miss"),
+            entry(11.4, "detector", "miss"),
+            entry(22.0, "detector", "miss"),
+            entry(22.1, "detector", "alarm"),
+            entry(22.2, "detector", "miss"),
         ];
         let told = told(&entries);
         let lines: Vec<_> = told
@@ -144,7 +144,7 @@ mod tests {
         assert_eq!(
             lines,
             [
-                ("detector", "6 cycles in 1.4 s", Some(6)),
+                ("detector", "6 cycles in 10.4 s", Some(6)),
                 ("identifier", "2 cycles", Some(2)),
                 ("detector", "2 cycles", Some(2)),
                 ("detector", "2 cycles", None),
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn misses_are_told_at_once_and_then_each_second() {
+    fn misses_are_told_at_once_and_then_every_ten_seconds() {
         let mut pending = PendingMisses::default();
         let lines = |told: Vec<TimelineEntry>| -> Vec<String> {
             let line = |entry: TimelineEntry| format!("{} {}", entry.service, entry.what);
@@ -164,14 +164,14 @@ mod tests {
         let miss = |t_s| entry(t_s, "detector", "miss");
         assert_eq!(lines(pending.add(&miss(1.0))), ["detector 2 cycles"]);
         assert_eq!(lines(pending.add(&miss(1.1))), [""; 0]);
-        assert_eq!(lines(pending.add(&miss(1.9))), [""; 0]);
-        assert_eq!(lines(pending.due(1_900_000_000)), [""; 0]);
-        let second = "detector 4 cycles in 0.8 s";
-        assert_eq!(lines(pending.due(2_000_000_000)), [second]);
-        assert_eq!(lines(pending.add(&miss(2.5))), [""; 0]);
-        let alarm = entry(2.6, "detector", "alarm");
+        assert_eq!(lines(pending.add(&miss(10.9))), [""; 0]);
+        assert_eq!(lines(pending.due(10_900_000_000)), [""; 0]);
+        let together = "detector 4 cycles in 9.8 s";
+        assert_eq!(lines(pending.due(11_000_000_000)), [together]);
+        assert_eq!(lines(pending.add(&miss(11.5))), [""; 0]);
+        let alarm = entry(11.6, "detector", "alarm");
         let told = lines(pending.add(&alarm));
         assert_eq!(told, ["detector 2 cycles", "detector 2 cycles"]);
-        assert_eq!(lines(pending.add(&miss(2.7))), ["detector 2 cycles"]);
+        assert_eq!(lines(pending.add(&miss(11.7))), ["detector 2 cycles"]);
     }
 }

@@ -43,6 +43,8 @@ impl fmt::Display for CommandError {
     }
 }
 
+impl std::error::Error for CommandError {}
+
 /// The exit code of a command: 0 done, 1 failed, 2 refused. What went wrong goes to standard error.
 #[must_use]
 pub fn exit_code(result: Result<Outcome, CommandError>) -> ExitCode {

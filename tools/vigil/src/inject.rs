@@ -33,7 +33,12 @@ pub struct Args {
 /// A specification or configuration that is refused; no simulator that answers.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let Some(spec) = &args.spec else {
-        output::line(&forms().join("\n")).map_err(CommandError::failure)?;
+        let forms = forms();
+        let lines = forms
+            .iter()
+            .map(|[form, about]| format!("{form}\n    {about}"));
+        let lines: Vec<String> = lines.collect();
+        output::line(&lines.join("\n")).map_err(CommandError::failure)?;
         return Ok(Outcome::Done);
     };
     let running = args.running.find().map_err(CommandError::failure)?;

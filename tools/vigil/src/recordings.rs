@@ -1,6 +1,7 @@
 //! `vigil recordings`: what the black box of a graph has written.
 
 use std::fs;
+use std::iter;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
@@ -140,6 +141,8 @@ fn text(document: &Document) -> String {
     if document.recordings.is_empty() {
         return format!("no recordings in {}", document.folder);
     }
+    let head = "written       size       recording: graph, when it was asked for (UTC), and why";
+    let hint = "`vigil report FILE --out page.html` writes a page about one";
     let lines = document.recordings.iter().map(|recording| {
         let mib = recording.bytes as f64 / f64::from(1 << 20);
         let time = unix_time_of_day(recording.written_unix_s);
@@ -151,6 +154,8 @@ fn text(document: &Document) -> String {
         let path = Path::new(&document.folder).join(&recording.name);
         format!("{time}  {mib:7.1} MiB  {}{state}", path.display())
     });
+    let lines = iter::once(head.to_owned()).chain(lines);
+    let lines = lines.chain([hint.to_owned()]);
     lines.collect::<Vec<String>>().join("\n")
 }
 
@@ -187,9 +192,7 @@ mod tests {
         };
         let text = text(&document);
         assert!(text.contains("1.0 MiB  f/rover-1-alarm.mcap\n"), "{text}");
-        assert!(
-            text.ends_with("rover-2-crash.mcap.part  is being written"),
-            "{text}"
-        );
+        let is_marked = "rover-2-crash.mcap.part  is being written\n`vigil report";
+        assert!(text.contains(is_marked), "{text}");
     }
 }

@@ -23,6 +23,14 @@ pub use text::percent_text;
 
 /// Shows the state of a running graph once: faults, beliefs, the decision, services, times.
 ///
+/// A reason is the channel that speaks most for a fault, by so many nat: 2.3 nat is a factor of 10
+/// in likelihood. The runner-up is what would explain the data next best.
+///
+/// The decision names the wheels that it is about. compensate: drive on, and steer against a stuck
+/// wheel. ignore_encoder: drive on without that encoder. limp_home: both, for several faults. What
+/// an action is worth is the reward that the decision model expects from now on, in its own unit;
+/// after it stands what the next best is worth less.
+///
 /// Exit codes: 0 nothing is wrong and a launcher supervises the graph, else 1.
 #[derive(Debug, clap::Args)]
 pub struct Args {

@@ -234,13 +234,17 @@ fn each_fault_of_a_set_has_a_life() {
     let mut story = Story::new(&shipped());
     story.report(FRONT, 1.0);
     let mut both = belief(MODE_MULTIPLE);
-    both.set_count = 2;
+    (both.set_count, both.channel_evidence[5]) = (2, 9.0);
     both.sets[1] = FaultSet {
         leaves: 1 << FRONT | 1 << OTHER,
         p: 0.4,
     };
     story.pass(Some(&both), 1.0);
     assert_eq!(story.kept(), [(FRONT, Active, 1), (OTHER, Active, 1)]);
+    // Each keeps its own reason.
+    let block = story.block();
+    let reasons: Vec<u32> = block.kept().map(|it| it.evidence_channel).collect();
+    assert_eq!(reasons, [3, 5]);
     // The report is held, but the sets speak of none.
     both.set_count = 1;
     story.pass(Some(&both), 6.0);

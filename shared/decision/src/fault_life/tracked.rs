@@ -1,6 +1,8 @@
 //! One fault through its life.
 
-use vigil_blocks::{EVIDENCE, FAULT_NODES, FaultRecord, FaultSource, FaultState, MODE_UNKNOWN};
+use vigil_blocks::{
+    EVIDENCE, FAULT_NODES, FaultRecord, FaultSource, FaultState, MODE_MULTIPLE, MODE_UNKNOWN,
+};
 use vigil_checkpoint::CheckpointValue;
 
 use super::LifeInput;
@@ -122,6 +124,10 @@ impl Tracked {
         let of = |values: &[f64]| values.get(node).copied().unwrap_or_default();
         (record.size, record.size_sd) = (of(&diagnosis.size), of(&diagnosis.size_sd));
         record.size_kind = diagnosis.size_kind.get(node).copied().unwrap_or_default();
+        // What speaks for several faults is the newest one's: each keeps what spoke for itself.
+        if diagnosis.reported == MODE_MULTIPLE && record.evidence > 0.0 {
+            return;
+        }
         let evidence = diagnosis.channel_evidence.iter().enumerate();
         let strongest = evidence.max_by(|a, b| a.1.total_cmp(b.1));
         let (channel, nat) = strongest.map_or((EVIDENCE, 0.0), |(i, nat)| (i, *nat));

@@ -325,16 +325,28 @@ impl PublisherCheck {
 
     fn judge(&self, test: usize) -> TestOutcome {
         match test {
-            TRAVEL => self.poses.travel(),
-            TURN => self.poses.turn(),
+            TRAVEL => self.of_body(self.poses.travel()),
+            TURN => self.of_body(self.poses.turn()),
             GYRO if self.gyro.turn_rad < TURN_MIN_RAD => TestOutcome::NotYet,
-            GYRO => turn(FindingKind::Gyro, self.gyro.product / self.gyro.square),
+            GYRO => {
+                let ratio = self.gyro.product / self.gyro.square;
+                self.of_body(turn(FindingKind::Gyro, ratio))
+            }
             UNIT => self.wheels.unit(),
             SIGN..STEER => self.wheels.sign(test - SIGN),
             STEER..SIDES => self.wheels.steering(test - STEER),
             SIDES..AXLES => self.order(WheelChannel::Rate, test - SIDES, Group::Across),
             AXLES..STEER_ORDER => self.order(WheelChannel::Rate, test - AXLES, Group::Side),
             _ => self.order(WheelChannel::Steer, test - STEER_ORDER, Group::Steered),
+        }
+    }
+
+    /// The outcome of a test of the body's motion: wheels that do not obey may be why.
+    fn of_body(&self, outcome: TestOutcome) -> TestOutcome {
+        match (outcome, self.wheels.obey()) {
+            (TestOutcome::Wrong(_), None) => TestOutcome::NotYet,
+            (TestOutcome::Wrong(_), Some(false)) => TestOutcome::Unclear,
+            (outcome, _) => outcome,
         }
     }
 

@@ -307,6 +307,25 @@ impl Wheels {
         }
     }
 
+    /// Whether the wheels turn as they are told, in whatever unit; none while their motion has not
+    /// shown it. One that does not, as it sticks, may turn the body in any way.
+    pub fn obey(&self) -> Option<bool> {
+        let driven = |rate: &&RegressionSums| rate.time_s > 0.0;
+        let rates = self.straight[..self.wheel_count].iter().filter(driven);
+        let is_omni = self.kinematics == Kinematics::Omni3;
+        if !is_omni && !rates.clone().all(is_rolled) {
+            return None;
+        }
+        let rolled = rates.filter(|rate| is_rolled(rate));
+        let [mut least, mut most] = [f64::INFINITY, 0.0_f64];
+        for rate in rolled.clone() {
+            let ratio = rate.ratio().abs();
+            (least, most) = (least.min(ratio), most.max(ratio));
+        }
+        let is_one_unit = most <= RATIO_MAX * least;
+        Some(is_one_unit && rolled.clone().all(RegressionSums::follows))
+    }
+
     /// Wheels of a group.
     pub fn others(&self, group: Group, wheel: usize) -> impl Iterator<Item = usize> {
         let all = 0..self.wheel_count;

@@ -2,6 +2,7 @@
 
 #![cfg(test)]
 
+mod action_text;
 mod channel_model;
 mod condition;
 mod contexts;

@@ -250,6 +250,24 @@ fn each_mistake_is_told_on_each_robot() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// A robot with two wheels turns about the one that sticks, to the left whatever it is told.
+#[test]
+fn a_body_that_turns_about_a_stuck_wheel_has_no_other_sign() {
+    let about_left: Mistake = |frame, map| {
+        let right_m_s = frame.command[0] + 0.115 * frame.command[1];
+        map.set_wheel_rate(frame, 0, 0.0);
+        map.set_yaw_rate(frame, right_m_s / 0.23);
+    };
+    for seconds in [0.8, 1.4, 2.0, 8.0] {
+        let (found, _) = checked("kobuki", &[([0.25, -0.6], seconds)], about_left);
+        assert_eq!(found, [""; 0], "{seconds} s");
+    }
+    // With wheels that obey it has.
+    let reversed: Mistake = |frame, map| scale_gyro(frame, map, -1.0);
+    let (found, _) = checked("kobuki", &[([0.25, -0.6], 8.0)], reversed);
+    assert!(found[0].starts_with("signs: yaw_rate is -"), "{found:?}");
+}
+
 /// True if something that begins so is said to fit.
 fn says(fits: &[String], what: &str) -> bool {
     fits.iter().any(|text| text.starts_with(what))

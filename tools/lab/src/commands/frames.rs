@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use vigil_blocks::SensorFrame;
+use vigil_blocks::{DetectionBelief, SensorFrame};
 use vigil_cycle::topic::Topic;
 use vigil_flight::{FlightError, FlightReader, Recorded, read_block};
 use vigil_recording::RunWriter;
@@ -14,6 +14,7 @@ use vigil_terminal::{CommandError, Outcome, output};
 /// Writes the frames of a recording as a table, to learn from, to diagnose or to play back.
 ///
 /// A column for each command and channel; a pause or another run of the robot begins a new run.
+/// Where in the table the detector's alarm rose is said.
 ///
 /// Exit codes: 0 done, 1 the recording holds no frames of its robot, or is damaged: then what
 /// comes before is written.
@@ -47,10 +48,21 @@ pub struct Document {
     runs: u32,
     /// Time that the runs cover.
     recorded_s: f64,
+    /// When the detector's alarm rose.
+    alarms: Vec<AlarmInTable>,
     /// Frames that were left out, as they carry no command or are of another robot.
     left_out: u64,
     /// Why the rest of the file cannot be read; null if all of it was.
     damaged: Option<String>,
+}
+
+/// An alarm, where the table has it.
+#[derive(Debug, Serialize, JsonSchema)]
+struct AlarmInTable {
+    /// The run.
+    run: u32,
+    /// Time in the run.
+    t_s: f64,
 }
 
 /// Writes the frames.
@@ -84,7 +96,7 @@ fn write(recording: &Path, out: &Path) -> Result<Document, CommandError> {
     let setup = reader.setup().map_err(CommandError::usage)?;
     let robot_hash = channel::hash(&setup.robot);
     let mut writer = RunWriter::new(&setup.robot, setup.file.graph.rate_hz, out);
-    let mut strange = 0;
+    let (mut strange, mut alarms, mut has_alarm) = (0, Vec::new(), false);
     let damaged = loop {
         match reader.next() {
             Ok(None) => break None,
@@ -98,6 +110,18 @@ fn write(recording: &Path, out: &Path) -> Result<Document, CommandError> {
                 }
                 _ => strange += 1,
             },
+            Ok(Some(Recorded::Block {
+                topic: Topic::Detection,
+                bytes,
+                ..
+            })) => {
+                let alarm = read_block::<DetectionBelief>(bytes).map(|it| it.alarm != 0);
+                let has_risen = alarm == Some(true) && !has_alarm;
+                has_alarm = alarm.unwrap_or(has_alarm);
+                // A detection follows its frame.
+                let at = writer.last().filter(|_| has_risen);
+                alarms.extend(at.map(|(run, t_s)| AlarmInTable { run, t_s }));
+            }
             Ok(Some(_)) => {}
             Err(error @ FlightError::Damaged { .. }) => break Some(error.to_string()),
             Err(error) => return Err(CommandError::failure(error)),
@@ -113,6 +137,7 @@ fn write(recording: &Path, out: &Path) -> Result<Document, CommandError> {
         frames: counts.frames,
         runs: counts.runs,
         recorded_s: counts.recorded_s,
+        alarms,
         left_out: counts.without_command + strange,
         damaged,
     })
@@ -122,10 +147,13 @@ fn text(document: &Document) -> String {
     let mut lines = vec![match document.frames {
         0 => format!("{}: no frames, nothing was written", document.recording),
         frames => format!(
-            "{}: {frames} frames, {} runs, {:.1} s",
+            "{}: {frames} frames, runs {}, {:.1} s",
             document.frames_file, document.runs, document.recorded_s
         ),
     }];
+    let alarms = document.alarms.iter();
+    let alarms = alarms.map(|it| format!("alarm: run {}, t_s {:.3}", it.run, it.t_s));
+    lines.extend(alarms);
     if document.left_out > 0 {
         let count = document.left_out;
         lines.push(format!(

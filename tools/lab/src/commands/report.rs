@@ -10,7 +10,7 @@ use vigil_recording::labels::Label;
 use super::files::{check_place, write_whole};
 use super::offline::FilterArgs;
 use vigil_terminal::output::Progress;
-use vigil_terminal::{CommandError, Outcome};
+use vigil_terminal::{CommandError, Outcome, output};
 
 /// Writes one page (HTML) about a recording of the black box, or about recorded frames.
 ///
@@ -86,6 +86,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         }
     };
     write_whole(&args.out, &page)?;
+    let said = format!("page: {}", args.out.display());
+    output::line(&said).map_err(CommandError::failure)?;
     Ok(Outcome::Done)
 }
 

@@ -199,6 +199,15 @@ impl Document {
 }
 
 impl NamedFault {
+    /// How long it has been there, s; of one that is over, how long it has been.
+    pub fn lasts_s(&self) -> f64 {
+        let over = [FaultState::Latched, FaultState::Cleared].map(FaultState::name);
+        match over.contains(&self.state) {
+            true => self.changed_ago_s,
+            false => self.first_ago_s,
+        }
+    }
+
     fn new(record: &FaultRecord, setup: &Setup, now: &Now) -> Self {
         let action = setup.decision.actions().get(record.action as usize);
         let is_robot = record.source == FaultSource::Robot as u32;

@@ -1,6 +1,6 @@
 //! What an operator says about faults: somebody knows; forget what is over.
 
-use vigil_blocks::{Control, ControlCommand};
+use vigil_blocks::{Control, ControlCommand, FaultState};
 use vigil_cycle::Topic;
 use vigil_cycle::topic::ServiceName;
 use vigil_setup::RunningArgs;
@@ -40,6 +40,10 @@ pub fn acknowledge(args: &AckArgs) -> Result<Outcome, CommandError> {
         "all" => (0, "all"),
         fault => {
             let fault = find(&document, fault)?;
+            if fault.state == FaultState::Acknowledged.name() {
+                let why = format!("{} is acknowledged already", fault.name);
+                return Err(CommandError::failure(why));
+            }
             (fault.number, fault.name.as_str())
         }
     };

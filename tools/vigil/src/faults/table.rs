@@ -39,7 +39,7 @@ fn line(fault: &NamedFault) -> String {
         fault.number,
         fault.name,
         fault.state,
-        ago(fault.changed_ago_s),
+        ago(fault.lasts_s()),
         first_at(fault),
         fault.count,
         fault.action,
@@ -57,7 +57,11 @@ fn quiet(fault: &NamedFault) -> Option<String> {
 /// The size, and what speaks for it.
 pub fn why(fault: &NamedFault) -> String {
     let evidence = fault.evidence.as_ref().map(|it| {
-        let (channel, nat, against) = (&it.channel, it.nat, &it.against);
+        let against = match it.against.as_str() {
+            "MULTIPLE" => "several faults",
+            fault => fault,
+        };
+        let (channel, nat) = (&it.channel, it.nat);
         format!("{channel} says so by {nat:.1} nat; runner-up {against}")
     });
     let size = fault.size.as_ref().map(|size| size.text.clone());

@@ -14,6 +14,8 @@ const COLUMNS: usize = 80;
 const FAULTS: usize = 3;
 /// Events that are told; `vigil events` tells all.
 const EVENTS: usize = 4;
+/// What is less probable is not told.
+const P_SHOWN: f64 = 0.0005;
 
 /// The lines.
 pub fn text(document: &Document) -> String {
@@ -37,7 +39,7 @@ pub fn text(document: &Document) -> String {
         entries.extend(leaves.map(|node| (node.name.as_str(), node.p)).take(3));
         entries.push(("UNKNOWN", diagnosis.p_unknown));
         entries.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let told = entries.iter().take(4);
+        let told = entries.iter().filter(|(_, p)| *p >= P_SHOWN).take(4);
         let told: Vec<String> = told.map(|(name, p)| format!("{name} {p:.3}")).collect();
         let healthy = match diagnosis.mode == diagnosis.nominal {
             true => " (healthy)",
@@ -97,7 +99,7 @@ fn faults(document: &Document) -> Vec<String> {
 
 fn fault_text(fault: &NamedFault) -> String {
     let NamedFault { name, state, p, .. } = fault;
-    let (since, action) = (ago(fault.changed_ago_s), &fault.action);
+    let (since, action) = (ago(fault.lasts_s()), &fault.action);
     let times = match fault.count {
         1 => "once".to_owned(),
         count => format!("{count} times"),

@@ -51,7 +51,7 @@ pub fn lines(
 fn line(fault: &NamedFault, title: &'static str, palette: Palette) -> Line<'static> {
     let Look { sign, style } = look(fault, palette);
     let NamedFault { name, state, p, .. } = fault;
-    let since = ago(fault.changed_ago_s);
+    let since = ago(fault.lasts_s());
     let times = match fault.count {
         1 => "once".to_owned(),
         count => format!("{count} times"),

@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 
 use super::palette::Palette;
 
-const LINES: [&str; 16] = [
+const LINES: [&str; 18] = [
     " q, Esc, Ctrl-C    quit; the graph goes on                    ",
     " up, down, PgUp..  scroll the events; End: the newest         ",
     " ?, h              this help                                  ",
@@ -14,6 +14,8 @@ const LINES: [&str; 16] = [
     " UNKNOWN           no known fault explains what is measured   ",
     " ND                no fault at all                            ",
     " nat               evidence: 2.3 nat is a factor of 10        ",
+    " compensate        steers against a stuck wheel, and drives on",
+    " worth             reward that the decision model expects     ",
     " us, worst         cycle time: the last, and the longest      ",
     " missed            cycles whose deadline passed               ",
     " over              cycles longer than their budget            ",

@@ -176,8 +176,8 @@ fn of_time(runs: &[Run]) -> Vec<Figure> {
         ),
         mean("contradiction_s", runs, |run| run.contradiction_s),
         longest(runs),
-        most("faults_told_most", runs, |run| run.faults_told),
-        most("activations_most", runs, |run| run.activations),
+        most("faults_told_most", runs, Run::faults_told),
+        most("activations_most", runs, Run::activations),
         mean("blind_s", runs, |run| run.blind_s),
     ];
     let has_fault = runs.iter().any(|run| run.from_2_s.driven_s > 0.0);
@@ -218,7 +218,7 @@ fn of_health(runs: &[Run]) -> Vec<Figure> {
     let found = [
         rate("alarms", runs, |run| run.alarms, one),
         rate("alarms_per_h", runs, |run| run.alarms, hours),
-        rate("faults_told", runs, |run| run.faults_told, one),
+        rate("faults_told", runs, Run::faults_told, one),
         rate(
             "told_without_alarm",
             runs,

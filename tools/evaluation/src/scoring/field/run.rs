@@ -1,5 +1,9 @@
 //! One run, verdict by verdict.
 
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
 use super::claims::{Claim, Instants};
 use super::{BLIND, CONFIDENT, HELD_S, JUDGED_S, RobotOrder, SIZED_S, Stretch, Truth};
 use crate::scoring::{TIME_SLACK_S, Taxonomy, Verdict};
@@ -94,6 +98,21 @@ impl Actions {
     }
 }
 
+/// A change in what an operator was told of a fault of the robot.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Told {
+    /// When, s.
+    pub t_s: f64,
+    /// Counts the run's faults, from 1.
+    pub number: u64,
+    /// Its name.
+    pub fault: String,
+    /// The state that it came to.
+    pub state: &'static str,
+    /// How often it has become active.
+    pub count: u32,
+}
+
 /// What one run brought.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Run {
@@ -141,14 +160,32 @@ pub struct Run {
     pub contradiction_longest_s: f64,
     /// Time without valid input as it is reported, s.
     pub blind_s: f64,
-    /// Faults of the robot that an operator was told of.
-    pub faults_told: usize,
-    /// How often one of them became active.
-    pub activations: usize,
+    /// What an operator was told of faults of the robot, in order.
+    pub told: Vec<Told>,
     /// How often one of them became active while no alarm stood.
     pub told_without_alarm: usize,
     /// Faults that were gone before an operator was told of them.
     pub faults_pending: usize,
+}
+
+impl Run {
+    /// Faults of the robot that an operator was told of, each with how often it became active.
+    fn activations_by_fault(&self) -> BTreeMap<u64, u32> {
+        let told = self.told.iter();
+        told.map(|change| (change.number, change.count)).collect()
+    }
+
+    /// Faults of the robot that an operator was told of.
+    #[must_use]
+    pub fn faults_told(&self) -> usize {
+        self.activations_by_fault().len()
+    }
+
+    /// How often one of them became active.
+    #[must_use]
+    pub fn activations(&self) -> usize {
+        self.activations_by_fault().values().sum::<u32>() as usize
+    }
 }
 
 /// Scores one run while it goes on.
