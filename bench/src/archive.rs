@@ -31,7 +31,7 @@ pub enum Outlet {
 impl Outlet {
     /// As `--json` says.
     #[must_use]
-    pub const fn of(json: bool) -> Self {
+    pub const fn by_flag(json: bool) -> Self {
         match json {
             true => Self::Json,
             false => Self::Files,

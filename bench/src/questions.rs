@@ -76,7 +76,7 @@ impl MissionArgs {
         say: impl FnOnce(&mut Archive),
     ) -> Result<(), Box<dyn Error>> {
         document["wall_s"] = json!(began.elapsed().as_secs_f64());
-        let mut archive = Archive::new(question, Outlet::of(self.json))?;
+        let mut archive = Archive::new(question, Outlet::by_flag(self.json))?;
         archive.store(&format!("{question}.json"), &document)?;
         if let Some(lines) = lines {
             archive.store_text(&format!("{question}.csv"), &lines)?;

@@ -7,7 +7,7 @@ use vigil_blocks::{FaultRecord, FaultSource, FaultState, Readiness, SensorFrame}
 use vigil_decision::{FaultLife, LifeInput};
 use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Verdict;
-use vigil_evaluation::scoring::field::{Run, Scorer, Told};
+use vigil_evaluation::scoring::field::{Run, Scorer, ToldChange};
 use vigil_evaluation::stages::Stages;
 use vigil_robot::FaultTree;
 use vigil_setup::{Setup, fault_name};
@@ -29,7 +29,7 @@ struct ToldFaults {
     /// Names of faults.
     tree: FaultTree,
     /// Changes, in order.
-    told: Vec<Told>,
+    told: Vec<ToldChange>,
     /// The robot's that were pending at some time, by number.
     pending: BTreeSet<u64>,
     /// When the alarm stood last, s.
@@ -62,7 +62,7 @@ impl ToldFaults {
         while let Some(record) = self.life.take_change() {
             // That frames are missing is for other figures.
             if record.source == FaultSource::Robot as u32 {
-                self.told.push(Told {
+                self.told.push(ToldChange {
                     t_s,
                     number: record.number,
                     fault: fault_name(&self.tree, record.source, record.what).to_owned(),

@@ -45,7 +45,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         rounds,
     };
     let run = vigil_bench::in_folder("blackbox", |folder| plan.run(folder))?;
-    let mut archive = Archive::new("blackbox", Outlet::of(args.json))?;
+    let mut archive = Archive::new("blackbox", Outlet::by_flag(args.json))?;
     archive.say(&format!(
         "One graph of the rover at {} Hz, {rounds} rounds of four times {seconds} s: without a \
          black box, with one, with one that is stopped (SIGSTOP), and with one that is killed \

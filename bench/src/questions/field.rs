@@ -108,7 +108,7 @@ fn show(args: &Args, outcomes: &[Outcome<'_>], document: &Value) -> Result<(), B
     // A part has a name of its own, so that it does not stand for the whole.
     let parts = args.only.iter().map(|name| name.replace('/', "-"));
     let words: Vec<String> = iter::once("field".to_owned()).chain(parts).collect();
-    let mut archive = Archive::new(&words.join("-"), Outlet::of(args.json))?;
+    let mut archive = Archive::new(&words.join("-"), Outlet::by_flag(args.json))?;
     archive.store("field.json", document)?;
     let table = lines(outcomes);
     archive.store_text("table.md", &format!("{}\n", table.join("\n")))?;

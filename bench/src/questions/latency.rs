@@ -125,7 +125,7 @@ const fn or<'a, T>(given: &'a [T], otherwise: &'a [T]) -> &'a [T] {
 }
 
 fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
-    let mut archive = Archive::new(&archive_name(args, specs), Outlet::of(args.json))?;
+    let mut archive = Archive::new(&archive_name(args, specs), Outlet::by_flag(args.json))?;
     archive.say(&format!("{ABOUT}\n"));
     archive.say(&format!(
         "| {} |\n|{}",

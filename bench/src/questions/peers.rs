@@ -109,7 +109,7 @@ fn one(chain: &Chain, round: usize, folder: &Path) -> Value {
 }
 
 fn archive(args: &Args, rows: &[Value]) -> Result<(), Box<dyn Error>> {
-    let mut archive = Archive::new("peers", Outlet::of(args.json))?;
+    let mut archive = Archive::new("peers", Outlet::by_flag(args.json))?;
     let (rate, seconds, load) = (args.rate, args.seconds, args.load.name());
     let rounds = args.rounds;
     archive.say(&format!(

@@ -48,7 +48,7 @@ pub struct Args {
 /// Answers the question.
 pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let document = vigil_bench::in_folder("replay", measure)?;
-    archive(&document, Outlet::of(args.json))?;
+    archive(&document, Outlet::by_flag(args.json))?;
     match document["is_met"] == true {
         true => Ok(()),
         false => Err("too few faults, or not computed again as it was, or too slowly".into()),

@@ -33,7 +33,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if !(args.archive || args.json) {
         return Ok(output::line(&text)?);
     }
-    let mut archive = Archive::new("size", Outlet::of(args.json))?;
+    let mut archive = Archive::new("size", Outlet::by_flag(args.json))?;
     archive.say(&text);
     archive.store("size.json", &figures(&size))?;
     archive.close()?;

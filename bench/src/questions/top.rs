@@ -97,7 +97,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     }
     let document = vigil_bench::in_folder("top", |folder| measure(seconds, folder))?;
     let percent = document["percent_of_a_core"].as_f64().unwrap_or_default();
-    let mut archive = Archive::new("top", Outlet::of(args.json))?;
+    let mut archive = Archive::new("top", Outlet::by_flag(args.json))?;
     archive.say(&format!(
         "`vigil top` beside a graph at {RATE_HZ} Hz, on a terminal of 120 columns and 40 lines, \
          for {seconds} s: {percent:.2} % of a core; it wrote {} bytes a second. Bar: at most \

@@ -17,5 +17,6 @@ pub use told::{PendingMisses, told};
 pub use wall_clock::{WallClock, time_of_day, unix_time_of_day};
 pub use weighing::{NamedSecond, NamedState, NamedWeighing};
 pub use words::{
-    degraded as degraded_text, service_state as service_state_text, watchdog as watchdog_text,
+    degraded as degraded_text, reason as reason_text, service_state as service_state_text,
+    watchdog as watchdog_text,
 };

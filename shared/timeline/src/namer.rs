@@ -112,11 +112,8 @@ impl Namer {
             EventKind::Reason => {
                 let (channel, evidence) =
                     (evidence_name(&self.robot, event.what as usize), event.p);
-                let runner_up = match event.value as u32 {
-                    MODE_MULTIPLE => "several faults".to_owned(),
-                    fault => self.mode(fault),
-                };
-                format!("{channel} says so by {evidence:.1} nat; runner-up {runner_up}")
+                let runner_up = self.tree.mode_name(event.value as u32);
+                words::reason(&channel, evidence, runner_up)
             }
             EventKind::Size => {
                 let kind = SizeKind::from_wire(event.what >> 8);
@@ -133,10 +130,7 @@ impl Namer {
                 let wire = WireChange::from_event(kind == EventKind::Injected, event);
                 Change::from_wire(&wire).map_or("?".into(), |change| change.text(&self.robot))
             }
-            EventKind::Miss => match event.value {
-                1 => "1 cycle".into(),
-                count => format!("{count} cycles"),
-            },
+            EventKind::Miss => words::cycles(event.value),
             EventKind::SafeStop => match ActionRejection::from_repr(event.what) {
                 Some(ActionRejection::Nothing) => "no action".into(),
                 Some(ActionRejection::Expired) => "the action has expired".into(),

@@ -103,6 +103,24 @@ pub const fn watchdog(finding: WatchdogFinding) -> &'static str {
     }
 }
 
+/// How many cycles.
+pub fn cycles(count: u64) -> String {
+    match count {
+        1 => "1 cycle".to_owned(),
+        count => format!("{count} cycles"),
+    }
+}
+
+/// What speaks most for a fault, by how much, and what would explain the data next best.
+#[must_use]
+pub fn reason(channel: &str, evidence_nat: f64, runner_up: &str) -> String {
+    let runner_up = match runner_up {
+        "MULTIPLE" => "several faults",
+        fault => fault,
+    };
+    format!("{channel} says so by {evidence_nat:.1} nat; runner-up {runner_up}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

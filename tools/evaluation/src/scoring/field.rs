@@ -48,7 +48,7 @@ mod run;
 pub use claims::{CLAIMED_S, Claim};
 pub use figures::{Figure, Worst, figures};
 pub use recorded::{Figures, SAFE_STOP, of_cases};
-pub use run::{Actions, Changes, End, JudgedTime, Onset, Run, Scorer, Told};
+pub use run::{Actions, Changes, End, JudgedTime, Onset, Run, Scorer, ToldChange};
 
 use vigil_blocks::SizeKind;
 

@@ -1,6 +1,6 @@
 //! Faults for people.
 
-use vigil_timeline::unix_time_of_day;
+use vigil_timeline::{reason_text, unix_time_of_day};
 
 use super::document::{Document, NamedFault};
 
@@ -56,14 +56,8 @@ fn quiet(fault: &NamedFault) -> Option<String> {
 
 /// The size, and what speaks for it.
 pub fn why(fault: &NamedFault) -> String {
-    let evidence = fault.evidence.as_ref().map(|it| {
-        let against = match it.against.as_str() {
-            "MULTIPLE" => "several faults",
-            fault => fault,
-        };
-        let (channel, nat) = (&it.channel, it.nat);
-        format!("{channel} says so by {nat:.1} nat; runner-up {against}")
-    });
+    let evidence = fault.evidence.as_ref();
+    let evidence = evidence.map(|it| reason_text(&it.channel, it.nat, &it.against));
     let size = fault.size.as_ref().map(|size| size.text.clone());
     let parts = size.into_iter().chain(evidence);
     parts.collect::<Vec<String>>().join("; ")

@@ -100,7 +100,7 @@ impl Actions {
 
 /// A change in what an operator was told of a fault of the robot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Told {
+pub struct ToldChange {
     /// When, s.
     pub t_s: f64,
     /// Counts the run's faults, from 1.
@@ -161,7 +161,7 @@ pub struct Run {
     /// Time without valid input as it is reported, s.
     pub blind_s: f64,
     /// What an operator was told of faults of the robot, in order.
-    pub told: Vec<Told>,
+    pub told: Vec<ToldChange>,
     /// How often one of them became active while no alarm stood.
     pub told_without_alarm: usize,
     /// Faults that were gone before an operator was told of them.
