@@ -228,6 +228,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_is_printed_leaves_the_raw_data_of_an_archive_alone() {
+        let folder = root().join(RAW).join("printed");
+        fs::create_dir_all(&folder).unwrap();
+        fs::write(folder.join("kept.json"), "1").unwrap();
+        let mut archive = Archive::new("printed", Outlet::Json).unwrap();
+        archive.store("figures.json", &Value::Null).unwrap();
+        archive.store_page("page.html", "").unwrap();
+        assert_eq!(archive.folder(), None);
+        let left = Raw::list(&folder).unwrap();
+        let names: Vec<&str> = left.iter().map(|raw| raw.name.as_str()).collect();
+        assert_eq!(names, ["kept.json"]);
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
     fn an_archive_has_the_name_of_one_folder() {
         for name in [
             "latency",

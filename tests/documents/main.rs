@@ -141,6 +141,7 @@ fn help_without_a_build_is_the_launchers() {
     let output = Command::new(built::program("vigil-launcher"))
         .arg("--help")
         .env_remove("VIGIL_CONFIG")
+        .env_remove("COLUMNS")
         .output()
         .unwrap();
     let kept = std::fs::read_to_string(root().join("scripts/up.help")).unwrap();

@@ -238,12 +238,14 @@ fn help_and_misspelt_options_need_no_build() {
     assert_eq!(help.status.code(), Some(0), "{help:?}");
     let mut launcher = binary("vigil-launcher");
     let launcher = launcher.arg("--help").env_remove("VIGIL_CONFIG");
+    let launcher = launcher.env_remove("COLUMNS");
     let launcher = launcher.output().unwrap();
     let help = String::from_utf8_lossy(&help.stdout);
     let launcher = String::from_utf8_lossy(&launcher.stdout);
     assert!(
         help.ends_with(launcher.as_ref()),
-        "write it anew: target/debug/vigil-launcher --help > scripts/up.help"
+        "write it anew: env -u COLUMNS target/debug/vigil-launcher --help </dev/null 2>/dev/null \
+         >scripts/up.help"
     );
     for wrong in ["--duratoin", "--durat", "--sources=external"] {
         let refused = up(&[wrong, "5"]);

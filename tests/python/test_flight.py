@@ -146,6 +146,15 @@ class BlackBox(unittest.TestCase):
         self.assertGreater(alarm["t_s"], 4)
         self.assertEqual(events(summary, "diagnosis")[0], "RM_STUCK")
 
+        # In a table the alarm is where the wheel has come to stand.
+        table = self.folder / "alarm.csv"
+        said = vigil("frames", path, "--out", table, "--json")
+        (found,) = json.loads(said.stdout)["alarms"]
+        with open(table) as file:
+            rows = [(float(row["t"]), float(row["enc_RM"])) for row in csv.DictReader(file)]
+        stands_s = next(t for t, rate in rows if t > 2 and abs(rate) < 0.5)
+        self.assertTrue(0 <= found["t_s"] - stands_s < 1, (found, stands_s))
+
         # Each frame, with the wheel that stands still since the fault.
         wheels = flight.last("/joint_states")
         speed = dict(zip(wheels.name, wheels.velocity))

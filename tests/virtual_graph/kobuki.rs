@@ -18,6 +18,7 @@ pub struct Kobuki {
 impl Kobuki {
     /// `inject` holds `stuck:L@S`, or nothing.
     pub fn new(robot: &Description, inject: &[&str], seed: u64) -> Self {
+        assert!(inject.len() <= 1, "{inject:?}");
         let stuck = inject.first().map(|it| it.strip_prefix("stuck:L@"));
         Self {
             robot_hash: channel::hash(robot),

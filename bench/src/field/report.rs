@@ -98,9 +98,10 @@ impl<'a> Outcome<'a> {
             "figures": figures.collect::<serde_json::Map<_, _>>(),
             "bars": bars.collect::<Vec<Value>>(),
         });
-        // Where the question is how often something is told, when and what is the answer.
+        // A bar on how often something is told needs what was told, and when.
         if self.bars().any(|(bar, _)| bar.figure == "activations_most") {
-            let told = self.runs.iter().map(|run| json!([run.seed, run.told]));
+            let told = self.runs.iter().filter(|run| !run.told.is_empty());
+            let told = told.map(|run| json!({"seed": run.seed, "changes": run.told}));
             document["told"] = told.collect();
         }
         document

@@ -14,7 +14,8 @@ use crate::has_percentile;
 pub const ABOUT: &str = "Times in us; every latency from the schedule, hand-over and floor without \
                          compute; folded are instants that only a later one's answer ended. Own, \
                          by stage: instants that each stage answered after its own deadline and \
-                         that are not the machine's. Every cycle lies with the raw data.";
+                         that are not the machine's. Raw data of an archive hold every \
+                         cycle.";
 /// Heads of the table of all cells.
 pub const HEADS: [&str; 16] = [
     "cell",

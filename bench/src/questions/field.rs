@@ -115,7 +115,11 @@ fn show(args: &Args, outcomes: &[Outcome<'_>], document: &Value) -> Result<(), B
     if args.raw {
         archive.store("runs.json", &raw(outcomes))?;
     }
-    archive.say(&format!("{last} Every figure: `table.md`.\n"));
+    let table = match archive.folder() {
+        Some(_) => " Every figure: `table.md`.",
+        None => "",
+    };
+    archive.say(&format!("{last}{table}\n"));
     let barred = barred_lines(outcomes);
     barred.iter().for_each(|line| archive.say(line));
     archive.close()?;

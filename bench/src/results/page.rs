@@ -21,7 +21,8 @@ What a figure of `field` means stands in `tools/evaluation/src/scoring/field.rs`
 A result is one file, `results/<date>-<machine>/<question>.json`. It holds the lines that are shown
 here, all of them if they are not too many, the command, the commit, facts about the machine,
 figures for programs, and size and CRC-32 of the raw data. These lie in `target/bench/<question>/`
-where it was measured. `-` for a percentile: there are too few samples for it.
+where it was measured. With `--json` a question prints the same and keeps nothing; the keys stand in
+[result.schema.json](result.schema.json). `-` for a percentile: there are too few samples for it.
 ";
 
 /// The page, Markdown.

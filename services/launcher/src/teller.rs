@@ -34,7 +34,7 @@ impl Teller {
         self.show(&told);
     }
 
-    /// Tells the misses whose second is over.
+    /// Tells the misses whose time is over.
     pub fn tell_misses(&mut self, now_ns: u64) {
         let told = self.misses.due(now_ns);
         self.show(&told);

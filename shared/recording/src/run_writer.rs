@@ -71,12 +71,14 @@ impl RunWriter {
         self.counts
     }
 
-    /// The last frame that was written: its run as the table numbers it, and its time in it, s.
+    /// Where in the table a capture time lies: the present run as the table numbers it, and the
+    /// time in it, s; none outside what is written of that.
     #[must_use]
-    pub fn last(&self) -> Option<(u32, f64)> {
+    pub fn place_of(&self, t_capture_ns: u64) -> Option<(u32, f64)> {
         let run = self.run.as_ref()?;
-        let t_s = (run.last_ns - run.from_ns) as f64 * 1e-9;
-        Some((self.counts.runs - 1, t_s))
+        let is_in_it = (run.from_ns..=run.last_ns).contains(&t_capture_ns);
+        let t_s = t_capture_ns.saturating_sub(run.from_ns) as f64 * 1e-9;
+        is_in_it.then_some((self.counts.runs - 1, t_s))
     }
 
     /// Writes a frame.

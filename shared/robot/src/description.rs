@@ -369,7 +369,7 @@ impl Description {
         let is_mixed = wheels.stuck != 0 && wheels.encoders != 0;
         let name = |wheel: usize| {
             let name = &self.wheels.get(wheel)?.name;
-            let is_encoder = wheels.encoders >> wheel & 1 == 1;
+            let is_encoder = wheels.has_encoder(wheel) && !wheels.has_stuck(wheel);
             Some(match is_mixed && is_encoder {
                 true => format!("{name}_ENC"),
                 false => name.clone(),

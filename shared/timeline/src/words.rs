@@ -1,7 +1,8 @@
-//! Words of the timeline: symptoms, outcomes, degraded services, blindness, watchdog.
+//! Words of the timeline: symptoms, outcomes, degraded services, blindness, watchdog, reasons.
 
 use vigil_blocks::{
-    ActionOutcome, Blindness, ControlCommand, Degraded, Event, RecoveryKind, ServiceState, Symptoms,
+    ActionOutcome, Blindness, ControlCommand, Degraded, Event, MODE_MULTIPLE, RecoveryKind,
+    ServiceState, Symptoms, mode_word,
 };
 use vigil_cycle::watchdog::WatchdogFinding;
 
@@ -114,9 +115,9 @@ pub fn cycles(count: u64) -> String {
 /// What speaks most for a fault, by how much, and what would explain the data next best.
 #[must_use]
 pub fn reason(channel: &str, evidence_nat: f64, runner_up: &str) -> String {
-    let runner_up = match runner_up {
-        "MULTIPLE" => "several faults",
-        fault => fault,
+    let runner_up = match Some(runner_up) == mode_word(MODE_MULTIPLE) {
+        true => "several faults",
+        false => runner_up,
     };
     format!("{channel} says so by {evidence_nat:.1} nat; runner-up {runner_up}")
 }
@@ -124,6 +125,18 @@ pub fn reason(channel: &str, evidence_nat: f64, runner_up: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_cycle_and_a_set_are_told_as_people_say_it() {
+        assert_eq!([cycles(1), cycles(2)], ["1 cycle", "2 cycles"]);
+        let told = reason("wheel rate RM", 4.81, "MULTIPLE");
+        assert_eq!(
+            told,
+            "wheel rate RM says so by 4.8 nat; runner-up several faults"
+        );
+        let told = reason("wheel rate RM", 4.81, "RM_ENC");
+        assert_eq!(told, "wheel rate RM says so by 4.8 nat; runner-up RM_ENC");
+    }
 
     #[test]
     fn sets_of_symptoms_and_reasons_are_joined_and_empty_ones_have_a_word() {

@@ -86,6 +86,9 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         false => output::line(&text(&document)),
     };
     printed.map_err(CommandError::failure)?;
+    if !document.recordings.is_empty() {
+        eprintln!("`vigil report FILE --out page.html` writes a page about one");
+    }
     Ok(Outcome::Done)
 }
 
@@ -141,8 +144,7 @@ fn text(document: &Document) -> String {
     if document.recordings.is_empty() {
         return format!("no recordings in {}", document.folder);
     }
-    let head = "written       size       recording: graph, when it was asked for (UTC), and why";
-    let hint = "`vigil report FILE --out page.html` writes a page about one";
+    let head = "written         size  recording; its name holds the time in UTC, and the reason";
     let lines = document.recordings.iter().map(|recording| {
         let mib = recording.bytes as f64 / f64::from(1 << 20);
         let time = unix_time_of_day(recording.written_unix_s);
@@ -155,7 +157,6 @@ fn text(document: &Document) -> String {
         format!("{time}  {mib:7.1} MiB  {}{state}", path.display())
     });
     let lines = iter::once(head.to_owned()).chain(lines);
-    let lines = lines.chain([hint.to_owned()]);
     lines.collect::<Vec<String>>().join("\n")
 }
 
@@ -192,7 +193,7 @@ mod tests {
         };
         let text = text(&document);
         assert!(text.contains("1.0 MiB  f/rover-1-alarm.mcap\n"), "{text}");
-        let is_marked = "rover-2-crash.mcap.part  is being written\n`vigil report";
-        assert!(text.contains(is_marked), "{text}");
+        let marked = "rover-2-crash.mcap.part  is being written";
+        assert!(text.ends_with(marked), "{text}");
     }
 }

@@ -27,9 +27,10 @@ pub use text::percent_text;
 /// in likelihood. The runner-up is what would explain the data next best.
 ///
 /// The decision names the wheels that it is about. compensate: drive on, and steer against a stuck
-/// wheel. ignore_encoder: drive on without that encoder. limp_home: both, for several faults. What
-/// an action is worth is the reward that the decision model expects from now on, in its own unit;
-/// after it stands what the next best is worth less.
+/// wheel. ignore_encoder: drive on without that encoder. limp_home: both, for several faults;
+/// `LF_ENC` is the wheel LF, whose encoder is not trusted. What an action is worth is the reward
+/// that the decision model expects from now on, in its own unit; after it stands what the next best
+/// is worth less.
 ///
 /// Exit codes: 0 nothing is wrong and a launcher supervises the graph, else 1.
 #[derive(Debug, clap::Args)]

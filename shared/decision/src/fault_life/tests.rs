@@ -99,7 +99,7 @@ impl Story {
 
 fn belief(reported: u32) -> Box<FaultBelief> {
     let mut belief = Box::<FaultBelief>::default();
-    belief.reported = reported;
+    (belief.reported, belief.mode) = (reported, reported);
     belief.p_unknown = 0.75;
     belief.p[FRONT as usize] = 0.9;
     belief.channel_evidence[3] = 5.5;
@@ -239,9 +239,11 @@ fn each_fault_of_a_set_has_a_life() {
         leaves: 1 << FRONT | 1 << OTHER,
         p: 0.4,
     };
+    both.reported = FRONT;
+    story.pass(Some(&both), 0.1);
+    both.reported = MODE_MULTIPLE;
     story.pass(Some(&both), 1.0);
     assert_eq!(story.kept(), [(FRONT, Active, 1), (OTHER, Active, 1)]);
-    // Each keeps its own reason.
     let block = story.block();
     let reasons: Vec<u32> = block.kept().map(|it| it.evidence_channel).collect();
     assert_eq!(reasons, [3, 5]);

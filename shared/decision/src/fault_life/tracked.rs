@@ -1,8 +1,6 @@
 //! One fault through its life.
 
-use vigil_blocks::{
-    EVIDENCE, FAULT_NODES, FaultRecord, FaultSource, FaultState, MODE_MULTIPLE, MODE_UNKNOWN,
-};
+use vigil_blocks::{EVIDENCE, FAULT_NODES, FaultRecord, FaultSource, FaultState, MODE_UNKNOWN};
 use vigil_checkpoint::CheckpointValue;
 
 use super::LifeInput;
@@ -92,8 +90,8 @@ impl Tracked {
         self.record.what = what;
         (self.record.severity, self.record.latches) =
             (rule.severity as u32, u32::from(rule.latches));
-        // The onset of what has a name is known better.
-        self.record.frame_t_capture_ns = 0;
+        // The onset of what has a name is known better, and so is the reason.
+        (self.record.frame_t_capture_ns, self.record.evidence) = (0, 0.0);
     }
 
     /// It is one with what was there, and over, before.
@@ -124,8 +122,11 @@ impl Tracked {
         let of = |values: &[f64]| values.get(node).copied().unwrap_or_default();
         (record.size, record.size_sd) = (of(&diagnosis.size), of(&diagnosis.size_sd));
         record.size_kind = diagnosis.size_kind.get(node).copied().unwrap_or_default();
-        // What speaks for several faults is the newest one's: each keeps what spoke for itself.
-        if diagnosis.reported == MODE_MULTIPLE && record.evidence > 0.0 {
+        // What speaks for a set is mostly about the fault that came to it last: who has a reason
+        // of its own keeps that.
+        let is_alone = diagnosis.mode == it.what;
+        let is_new = record.evidence <= 0.0 || record.state == FaultState::Pending as u32;
+        if !(is_alone || is_new) {
             return;
         }
         let evidence = diagnosis.channel_evidence.iter().enumerate();

@@ -3,7 +3,7 @@
 use vigil_checkpoint::CheckpointValue;
 use vigil_inference::angle::wrap;
 
-use super::{Finding, FindingKind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
+use super::{Finding, FindingKind, Motion, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
 
 /// Length of a stretch, s. Chosen: a path is nearly straight over it, and 0.1 m at 0.2 m/s are
 /// twenty deviations of a pose of 5 mm.
@@ -32,6 +32,8 @@ struct Stretch {
     last_yaw: f64,
     turned_rad: f64,
     elapsed_s: f64,
+    /// A wheel stood in it.
+    has_standing: bool,
     /// Commanded displacement, forward and left, m, and turn, rad.
     commanded: [f64; 3],
 }
@@ -49,7 +51,9 @@ pub(super) struct Poses {
     come_m: f64,
     swung_rad: f64,
     turned_rad: f64,
+    /// Commanded turn, rad, and the part of it in which a wheel stood.
     turn_rad: f64,
+    standing_rad: f64,
 }
 
 impl Poses {
@@ -58,14 +62,9 @@ impl Poses {
         self.stretch = None;
     }
 
-    /// Takes the pose of a robot in motion, `dt_s` after the last; true if a stretch is complete.
-    pub fn take(
-        &mut self,
-        pose: Option<[f64; 3]>,
-        twist: [f64; 3],
-        dt_s: f64,
-        standing_m_s: f64,
-    ) -> bool {
+    /// Takes the pose of a robot in motion; true if a stretch is complete.
+    pub fn take(&mut self, pose: Option<[f64; 3]>, motion: Motion, standing_m_s: f64) -> bool {
+        let Motion { twist, dt_s, .. } = motion;
         let Some(pose) = pose else {
             self.stretch = None;
             return false;
@@ -75,9 +74,11 @@ impl Poses {
             last_yaw: pose[2],
             turned_rad: 0.0,
             elapsed_s: -dt_s,
+            has_standing: false,
             commanded: [0.0; 3],
         });
         stretch.elapsed_s += dt_s;
+        stretch.has_standing |= motion.has_standing;
         if stretch.elapsed_s > 0.0 {
             for (sum, rate) in stretch.commanded.iter_mut().zip(twist) {
                 *sum += rate * dt_s;
@@ -101,6 +102,9 @@ impl Poses {
         self.swung_rad += turn.abs();
         if turn.abs() >= TURNING_1_M * way_m {
             self.turn_rad += turn.abs();
+            if stretch.has_standing {
+                self.standing_rad += turn.abs();
+            }
             self.turned_rad += stretch.turned_rad * turn.signum();
         }
         // A turn in place goes nowhere.
@@ -153,7 +157,8 @@ impl Poses {
         if self.turn_rad < TURN_MIN_RAD {
             return TestOutcome::NotYet;
         }
-        super::turn(FindingKind::Turn, self.turned_rad / self.turn_rad)
+        let standing = self.standing_rad / self.turn_rad;
+        super::turn(FindingKind::Turn, self.turned_rad / self.turn_rad, standing)
     }
 }
 

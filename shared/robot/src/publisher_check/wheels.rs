@@ -22,6 +22,8 @@ const STEER_MIN_RAD: f64 = 0.06;
 /// Ratio of the forward and the left motion, squared, from which the wheels of an omni drive are
 /// told apart: below it two exchanged ones of three still follow, by [`RegressionSums::follows`].
 const AXIS_MIN: f64 = 0.6;
+/// A wheel that should turn at less than this share of the fastest may stand.
+const EXPECTED_MIN: f64 = 0.3;
 /// Commanded turn after which an order that no curve has shown is in doubt: a full turn.
 const TURN_ENOUGH_RAD: f64 = std::f64::consts::TAU;
 /// Places of all wheels.
@@ -307,23 +309,28 @@ impl Wheels {
         }
     }
 
-    /// Whether the wheels turn as they are told, in whatever unit; none while their motion has not
-    /// shown it. One that does not, as it sticks, may turn the body in any way.
-    pub fn obey(&self) -> Option<bool> {
-        let driven = |rate: &&RegressionSums| rate.time_s > 0.0;
-        let rates = self.straight[..self.wheel_count].iter().filter(driven);
-        let is_omni = self.kinematics == Kinematics::Omni3;
-        if !is_omni && !rates.clone().all(is_rolled) {
-            return None;
+    /// True if a wheel hardly turns that should, and others turn as they are told: it may turn the
+    /// body in any way.
+    pub fn has_standing(&self, robot: &Description, map: &ChannelMap, frame: &SensorFrame) -> bool {
+        let expected: [f64; WHEELS] = std::array::from_fn(|wheel| match wheel < self.wheel_count {
+            true => expected_rate(robot, wheel, &frame.command).abs(),
+            false => 0.0,
+        });
+        let least = EXPECTED_MIN * expected.iter().copied().fold(0.0, f64::max);
+        let [mut standing, mut turning] = [false; 2];
+        for (wheel, expected) in expected[..self.wheel_count].iter().enumerate() {
+            let rate = map.wheel_rate(frame, wheel).filter(|rate| rate.is_finite());
+            let Some(rate) = rate.filter(|_| *expected > least) else {
+                continue;
+            };
+            match rate.abs() / expected {
+                // These are other wheels' rates, or of another unit.
+                ratio if ratio > RATIO_MAX => return false,
+                ratio if ratio * RATIO_MAX < 1.0 => standing = true,
+                _ => turning = true,
+            }
         }
-        let rolled = rates.filter(|rate| is_rolled(rate));
-        let [mut least, mut most] = [f64::INFINITY, 0.0_f64];
-        for rate in rolled.clone() {
-            let ratio = rate.ratio().abs();
-            (least, most) = (least.min(ratio), most.max(ratio));
-        }
-        let is_one_unit = most <= RATIO_MAX * least;
-        Some(is_one_unit && rolled.clone().all(RegressionSums::follows))
+        standing && turning
     }
 
     /// Wheels of a group.

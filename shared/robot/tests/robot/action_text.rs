@@ -19,7 +19,7 @@ fn wheels_stand_after_the_action_and_broken_encoders_are_marked_beside_stuck_whe
         ("limp_home", stuck(lf).with(stuck(rm)), "limp_home:LF+RM"),
         (
             "limp_home",
-            encoder(lf).with(stuck(rm)),
+            encoder(lf).with(stuck(rm)).with(encoder(rm)),
             "limp_home:LF_ENC+RM",
         ),
     ] {

@@ -262,10 +262,38 @@ fn a_body_that_turns_about_a_stuck_wheel_has_no_other_sign() {
         let (found, _) = checked("kobuki", &[([0.25, -0.6], seconds)], about_left);
         assert_eq!(found, [""; 0], "{seconds} s");
     }
-    // With wheels that obey it has.
-    let reversed: Mistake = |frame, map| scale_gyro(frame, map, -1.0);
-    let (found, _) = checked("kobuki", &[([0.25, -0.6], 8.0)], reversed);
-    assert!(found[0].starts_with("signs: yaw_rate is -"), "{found:?}");
+    // One that sticks later.
+    let sticks: Mistake = |frame, map| {
+        let right_m_s = frame.command[0] + 0.115 * frame.command[1];
+        if frame.header.seq > 250 {
+            map.set_wheel_rate(frame, 0, 0.0);
+            map.set_yaw_rate(frame, right_m_s / 0.23);
+        }
+    };
+    let (found, _) = checked("kobuki", &[([0.3, 0.0], 5.0), ([0.25, -0.6], 8.0)], sticks);
+    assert_eq!(found, [""; 0]);
+}
+
+/// What no wheel explains is told beside one that stands, and what a wheel might explain where
+/// none does.
+#[test]
+fn mistakes_are_told_beside_a_broken_encoder_and_in_tight_curves() {
+    let in_degrees: Mistake = |frame, map| {
+        map.set_wheel_rate(frame, 0, 0.0);
+        scale_gyro(frame, map, 57.3);
+    };
+    let to_the_right: Mistake = |frame, _| frame.set_command(1, -frame.command[1]);
+    let tight = [([0.25, 0.9], 8.0), ([0.25, -0.9], 8.0)];
+    for (mistake, said) in [
+        (in_degrees, "units: yaw_rate is 5"),
+        (to_the_right, "signs: yaw_rate is -"),
+    ] {
+        for stretches in [&tight[..], &tight[..1], &tight[1..]] {
+            let (found, _) = checked("kobuki", stretches, mistake);
+            let is_told = found.iter().any(|text| text.starts_with(said));
+            assert!(is_told, "{said}: {found:?}");
+        }
+    }
 }
 
 /// True if something that begins so is said to fit.

@@ -96,7 +96,7 @@ fn write(recording: &Path, out: &Path) -> Result<Document, CommandError> {
     let setup = reader.setup().map_err(CommandError::usage)?;
     let robot_hash = channel::hash(&setup.robot);
     let mut writer = RunWriter::new(&setup.robot, setup.file.graph.rate_hz, out);
-    let (mut strange, mut alarms, mut has_alarm) = (0, Vec::new(), false);
+    let (mut strange, mut alarms, mut had_alarm) = (0, Vec::new(), None);
     let damaged = loop {
         match reader.next() {
             Ok(None) => break None,
@@ -115,12 +115,15 @@ fn write(recording: &Path, out: &Path) -> Result<Document, CommandError> {
                 bytes,
                 ..
             })) => {
-                let alarm = read_block::<DetectionBelief>(bytes).map(|it| it.alarm != 0);
-                let has_risen = alarm == Some(true) && !has_alarm;
-                has_alarm = alarm.unwrap_or(has_alarm);
-                // A detection follows its frame.
-                let at = writer.last().filter(|_| has_risen);
-                alarms.extend(at.map(|(run, t_s)| AlarmInTable { run, t_s }));
+                if let Some(detection) = read_block::<DetectionBelief>(bytes) {
+                    let has_alarm = detection.alarm != 0;
+                    // One that stands when the recording begins has risen before.
+                    let has_risen = has_alarm && had_alarm == Some(false);
+                    had_alarm = Some(has_alarm);
+                    let at = writer.place_of(detection.header.t_capture_ns);
+                    let at = at.filter(|_| has_risen);
+                    alarms.extend(at.map(|(run, t_s)| AlarmInTable { run, t_s }));
+                }
             }
             Ok(Some(_)) => {}
             Err(error @ FlightError::Damaged { .. }) => break Some(error.to_string()),
@@ -147,8 +150,8 @@ fn text(document: &Document) -> String {
     let mut lines = vec![match document.frames {
         0 => format!("{}: no frames, nothing was written", document.recording),
         frames => format!(
-            "{}: {frames} frames, runs {}, {:.1} s",
-            document.frames_file, document.runs, document.recorded_s
+            "{}: {frames} frames in {:.1} s, number of runs: {}",
+            document.frames_file, document.recorded_s, document.runs
         ),
     }];
     let alarms = document.alarms.iter();

@@ -199,12 +199,13 @@ impl Document {
 }
 
 impl NamedFault {
-    /// How long it has been there, s; of one that is over, how long it has been.
+    /// How long it has been present, s; of one that is over, or has come again, since its state
+    /// changed.
     pub fn lasts_s(&self) -> f64 {
-        let over = [FaultState::Latched, FaultState::Cleared].map(FaultState::name);
-        match over.contains(&self.state) {
-            true => self.changed_ago_s,
-            false => self.first_ago_s,
+        let present = [FaultState::Active, FaultState::Acknowledged].map(FaultState::name);
+        match present.contains(&self.state) && self.count == 1 {
+            true => self.first_ago_s,
+            false => self.changed_ago_s,
         }
     }
 

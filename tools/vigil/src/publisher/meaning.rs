@@ -62,7 +62,8 @@ pub fn findings(robot: &Description, frames: &[FrameArrival]) -> Vec<Finding> {
     }
     let unclear = scope.unclear.iter().map(|what| {
         format!(
-            "{what}: does not follow the command: does it stand still, or is it another channel?"
+            "{what}: does not follow the command: does it stand still, or a wheel, or is it \
+             another channel?"
         )
     });
     all.extend(unclear.map(finding(Status::Warning)));

@@ -46,7 +46,11 @@ pub fn text(document: &Document) -> String {
             false => "",
         };
         let mode = &diagnosis.mode;
-        lines.push(format!("diagnosis  {mode}{healthy}; {}", told.join("  ")));
+        let told = match told.is_empty() {
+            true => String::new(),
+            false => format!("; {}", told.join("  ")),
+        };
+        lines.push(format!("diagnosis  {mode}{healthy}{told}"));
     }
     if let Some(decision) = &document.decision {
         let (action, why) = (decision.action_text(), decision.why());
