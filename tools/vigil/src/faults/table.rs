@@ -86,9 +86,8 @@ pub fn ago(seconds: f64) -> String {
 mod tests {
     use super::*;
 
-    #[test]
-    fn of_a_fault_that_is_over_it_is_told_since_when_it_is_quiet() {
-        let mut fault = NamedFault {
+    fn latched() -> NamedFault {
+        NamedFault {
             number: 1,
             name: "RM_STUCK".to_owned(),
             source: "robot",
@@ -105,7 +104,31 @@ mod tests {
             evidence: None,
             action: "compensate".to_owned(),
             freeze_frame: None,
-        };
+        }
+    }
+
+    #[test]
+    fn an_acknowledgement_does_not_make_a_fault_younger() {
+        for (state, count, lasts_s) in [
+            ("pending", 0, 90.0),
+            ("active", 1, 3_600.0),
+            ("acknowledged", 1, 3_600.0),
+            ("latched", 1, 90.0),
+            ("cleared", 1, 90.0),
+            ("active", 2, 90.0),
+        ] {
+            let fault = NamedFault {
+                state,
+                count,
+                ..latched()
+            };
+            assert_eq!(fault.lasts_s(), lasts_s, "{state}, {count} times");
+        }
+    }
+
+    #[test]
+    fn of_a_fault_that_is_over_it_is_told_since_when_it_is_quiet() {
+        let mut fault = latched();
         let said = quiet(&fault).unwrap();
         assert_eq!(said, "not seen since 01:00:05, for 2 min");
         fault.last_unix_s = 3_699.5;

@@ -168,7 +168,7 @@ mod tests {
             lines[..7],
             [
                 "rover: FAULT, 100 Hz, up 1 min 2 s, launcher 4711",
-                "faults     RM_STUCK active for 4 min, 2 times, p 0.998, compensate",
+                "faults     RM_STUCK active for 3 min, 2 times, p 0.998, compensate",
                 "             stuck; wheel rate RM says so by 5.4 nat; runner-up RM_ENC",
                 "detector   p(fault) 0.998; ALARM, alarms so far 1",
                 "diagnosis  RM_STUCK; RM_STUCK 0.998  ND 0.001  UNKNOWN 0.001",

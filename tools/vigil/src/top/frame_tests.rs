@@ -123,7 +123,7 @@ fn a_fault_comes_first_with_why_and_what_is_done() {
 }
 
 const FAULTY: [&str; 5] = [
-    "faults    ! RM_STUCK     ACTIVE  for 4 min  2 times  p 0.998  compensate",
+    "faults    ! RM_STUCK     ACTIVE  for 3 min  2 times  p 0.998  compensate",
     "            stuck; wheel rate RM says so by 5.4 nat; runner-up RM_ENC",
     "belief    p(fault)     0.998  ██████████████                    █ ALARM (1)",
     "          RM_STUCK     0.998  ██████████████                    █",
