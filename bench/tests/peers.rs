@@ -1,4 +1,5 @@
 //! The chains of processes and threads, run for real: every carrier hands on every block.
+#![cfg(test)]
 
 use std::process::Command;
 

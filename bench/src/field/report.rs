@@ -91,20 +91,23 @@ impl<'a> Outcome<'a> {
             .figures
             .iter()
             .map(|figure| (figure.name.to_owned(), json!(figure)));
-        let mut document = json!({
+        json!({
             "scenario": self.scenario.name, "about": self.scenario.about,
             "sensors": self.sensors, "runs": self.runs.len(), "hours": self.hours(),
             "first_seed": self.scenario.first_seed,
             "figures": figures.collect::<serde_json::Map<_, _>>(),
             "bars": bars.collect::<Vec<Value>>(),
-        });
-        // A bar on how often something is told needs what was told, and when.
-        if self.bars().any(|(bar, _)| bar.figure == "activations_most") {
-            let told = self.runs.iter().filter(|run| !run.told.is_empty());
-            let told = told.map(|run| json!({"seed": run.seed, "changes": run.told}));
-            document["told"] = told.collect();
-        }
-        document
+        })
+    }
+
+    /// What an operator was told, run by run, if a bar is about how often.
+    fn told(&self) -> Option<Value> {
+        self.bars()
+            .find(|(bar, _)| bar.figure == "activations_most")?;
+        let runs = self.runs.iter().filter(|run| !run.told.is_empty());
+        let runs = runs.map(|run| json!({"seed": run.seed, "changes": run.told}));
+        let runs: Vec<Value> = runs.collect();
+        Some(json!({"scenario": self.scenario.name, "sensors": self.sensors, "runs": runs}))
     }
 
     /// The bars that are not met, one by line with the figure.
@@ -234,6 +237,12 @@ pub fn barred_lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
     let rows = outcomes.iter().flat_map(Outcome::lines);
     lines.extend(rows.filter(|row| !row.ends_with("|  |") && !row.contains(NOT_MET)));
     lines
+}
+
+/// What an operator was told in scenarios with a bar on how often.
+#[must_use]
+pub fn told(outcomes: &[Outcome<'_>]) -> Vec<Value> {
+    outcomes.iter().filter_map(Outcome::told).collect()
 }
 
 /// Everything as data.

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use vigil_bench::archive::{Archive, Outlet};
 use vigil_bench::field::{
     self, File, Graph, Job, Library, Outcome, Scenario, ScoredRun, barred_lines, document, jobs,
-    library, lines, select,
+    library, lines, select, told,
 };
 use vigil_bench::root;
 use vigil_evaluation::parallel::in_parallel;
@@ -110,6 +110,11 @@ fn show(args: &Args, outcomes: &[Outcome<'_>], document: &Value) -> Result<(), B
     let words: Vec<String> = iter::once("field".to_owned()).chain(parts).collect();
     let mut archive = Archive::new(&words.join("-"), Outlet::by_flag(args.json))?;
     archive.store("field.json", document)?;
+    // Beside it, as this stays in the result where all figures are too much.
+    let told = told(outcomes);
+    if !told.is_empty() {
+        archive.store("told.json", &Value::from(told))?;
+    }
     let table = lines(outcomes);
     archive.store_text("table.md", &format!("{}\n", table.join("\n")))?;
     if args.raw {
