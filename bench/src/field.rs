@@ -26,6 +26,6 @@ pub use delays::{Detected, MISSED_S, detect};
 pub use healthy::record;
 pub use job::{Job, ScoredRun};
 pub use recorded::{Library, Material, library};
-pub use report::{Outcome, barred_lines, document, lines, told};
+pub use report::{Outcome, barred_lines, document, lines, told_timelines};
 pub use run::{Graph, jobs, run, select};
 pub use scenario::{Departure, Draw, File, Frames, Scenario, Source, World};

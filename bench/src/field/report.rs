@@ -101,7 +101,7 @@ impl<'a> Outcome<'a> {
     }
 
     /// What an operator was told, run by run, if a bar is about how often.
-    fn told(&self) -> Option<Value> {
+    fn told_timelines(&self) -> Option<Value> {
         self.bars()
             .find(|(bar, _)| bar.figure == "activations_most")?;
         let runs = self.runs.iter().filter(|run| !run.told.is_empty());
@@ -241,8 +241,11 @@ pub fn barred_lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
 
 /// What an operator was told in scenarios with a bar on how often.
 #[must_use]
-pub fn told(outcomes: &[Outcome<'_>]) -> Vec<Value> {
-    outcomes.iter().filter_map(Outcome::told).collect()
+pub fn told_timelines(outcomes: &[Outcome<'_>]) -> Vec<Value> {
+    outcomes
+        .iter()
+        .filter_map(Outcome::told_timelines)
+        .collect()
 }
 
 /// Everything as data.

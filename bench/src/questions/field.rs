@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use vigil_bench::archive::{Archive, Outlet};
 use vigil_bench::field::{
     self, File, Graph, Job, Library, Outcome, Scenario, ScoredRun, barred_lines, document, jobs,
-    library, lines, select, told,
+    library, lines, select, told_timelines,
 };
 use vigil_bench::root;
 use vigil_evaluation::parallel::in_parallel;
@@ -111,7 +111,7 @@ fn show(args: &Args, outcomes: &[Outcome<'_>], document: &Value) -> Result<(), B
     let mut archive = Archive::new(&words.join("-"), Outlet::by_flag(args.json))?;
     archive.store("field.json", document)?;
     // Beside it, as this stays in the result where all figures are too much.
-    let told = told(outcomes);
+    let told = told_timelines(outcomes);
     if !told.is_empty() {
         archive.store("told.json", &Value::from(told))?;
     }

@@ -1,6 +1,7 @@
 //! What people are told: misses in a row are one line.
 
 use crate::entry::TimelineEntry;
+use crate::words::cycles;
 
 /// Misses of a service that lie closer are told together, ns.
 const MISSES_APART_NS: u64 = 10_000_000_000;
@@ -44,7 +45,7 @@ impl TimelineEntry {
         let count = self.count.unwrap_or(0) + later.count.unwrap_or(0);
         let during_s = later.t_ns.saturating_sub(self.t_ns) as f64 * 1e-9;
         self.count = Some(count);
-        self.what = format!("{count} cycles in {during_s:.1} s");
+        self.what = format!("{} in {during_s:.1} s", cycles(count));
     }
 }
 

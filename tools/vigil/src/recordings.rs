@@ -86,7 +86,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         false => output::line(&text(&document)),
     };
     printed.map_err(CommandError::failure)?;
-    if !document.recordings.is_empty() {
+    if !args.json && !document.recordings.is_empty() {
         eprintln!("`vigil report FILE --out page.html` writes a page about one");
     }
     Ok(Outcome::Done)

@@ -86,8 +86,6 @@ struct Motion {
     twist: [f64; 3],
     /// For so long, s.
     dt_s: f64,
-    /// A wheel stands that should turn: the body may turn about it.
-    has_standing: bool,
 }
 
 /// The tests of one publisher.
@@ -271,12 +269,7 @@ impl PublisherCheck {
         if self.settled_s < SETTLED_S {
             return None;
         }
-        let motion = Motion {
-            twist,
-            dt_s,
-            has_standing: self.wheels.has_standing(&self.robot, &self.map, frame),
-        };
-        self.add(frame, motion);
+        self.add(frame, Motion { twist, dt_s });
         self.unlooked_s += dt_s;
         if self.unlooked_s < LOOK_S {
             return None;
@@ -285,24 +278,24 @@ impl PublisherCheck {
     }
 
     fn add(&mut self, frame: &SensorFrame, motion: Motion) {
-        let Motion { twist, dt_s, .. } = motion;
+        let Motion { twist, dt_s } = motion;
+        let has_standing = self.wheels.take(&self.robot, &self.map, frame, motion);
         let standing_m_s = self.robot.body.standing_m_s;
         let pose = self
             .map
             .pose(frame)
             .filter(|pose| pose.iter().all(|v| v.is_finite()));
-        self.poses.take(pose, motion, standing_m_s);
+        self.poses.take(pose, motion, has_standing, standing_m_s);
         let turns = twist[2].abs() >= TURNING_1_M * twist[0].hypot(twist[1]);
         if let Some(yaw_rate) = self.map.yaw_rate(frame).filter(|v| turns && v.is_finite()) {
             self.gyro.product += yaw_rate * twist[2] * dt_s;
             self.gyro.square += twist[2] * twist[2] * dt_s;
             let turn_rad = twist[2].abs() * dt_s;
             self.gyro.turn_rad += turn_rad;
-            if motion.has_standing {
+            if has_standing {
                 self.gyro.standing_rad += turn_rad;
             }
         }
-        self.wheels.take(&self.robot, &self.map, frame, motion);
     }
 
     /// Evaluates every test that has not ended; returns the first that fails, and the others at the

@@ -63,8 +63,14 @@ impl Poses {
     }
 
     /// Takes the pose of a robot in motion; true if a stretch is complete.
-    pub fn take(&mut self, pose: Option<[f64; 3]>, motion: Motion, standing_m_s: f64) -> bool {
-        let Motion { twist, dt_s, .. } = motion;
+    pub fn take(
+        &mut self,
+        pose: Option<[f64; 3]>,
+        motion: Motion,
+        has_standing: bool,
+        standing_m_s: f64,
+    ) -> bool {
+        let Motion { twist, dt_s } = motion;
         let Some(pose) = pose else {
             self.stretch = None;
             return false;
@@ -78,7 +84,7 @@ impl Poses {
             commanded: [0.0; 3],
         });
         stretch.elapsed_s += dt_s;
-        stretch.has_standing |= motion.has_standing;
+        stretch.has_standing |= has_standing;
         if stretch.elapsed_s > 0.0 {
             for (sum, rate) in stretch.commanded.iter_mut().zip(twist) {
                 *sum += rate * dt_s;

@@ -22,7 +22,7 @@ const STEER_MIN_RAD: f64 = 0.06;
 /// Ratio of the forward and the left motion, squared, from which the wheels of an omni drive are
 /// told apart: below it two exchanged ones of three still follow, by [`RegressionSums::follows`].
 const AXIS_MIN: f64 = 0.6;
-/// A wheel that should turn at less than this share of the fastest may stand.
+/// A wheel that should turn at less than this share of the fastest is not asked whether it stands.
 const EXPECTED_MIN: f64 = 0.3;
 /// Commanded turn after which an order that no curve has shown is in doubt: a full turn.
 const TURN_ENOUGH_RAD: f64 = std::f64::consts::TAU;
@@ -89,14 +89,14 @@ impl Wheels {
         *self = Self::new(robot);
     }
 
-    /// Takes a frame of a robot in motion.
+    /// Takes a frame of a robot in motion; true if a wheel stands that should turn.
     pub fn take(
         &mut self,
         robot: &Description,
         map: &ChannelMap,
         frame: &SensorFrame,
         motion: Motion,
-    ) {
+    ) -> bool {
         let [speed, left, turn] = motion.twist;
         let dt_s = motion.dt_s;
         let reach_m = self.y_m.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
@@ -123,11 +123,12 @@ impl Wheels {
             self.way[0] + speed * speed * dt_s,
             self.way[1] + left * left * dt_s,
         );
+        let wheels = &PLACES[..self.wheel_count];
+        let has_standing = has_standing(wheels.iter().map(|&at| (found[at], expected[at])));
         if !is_omni && turn.abs() < TURNING_1_M * speed.abs() {
-            return;
+            return has_standing;
         }
         self.turned_rad += turn.abs() * dt_s;
-        let wheels = &PLACES[..self.wheel_count];
         if wheels.iter().all(|&wheel| found[wheel].1) {
             let values = found.map(|(value, _)| value);
             self.rate_sums.add(wheels, &values, &expected, dt_s);
@@ -137,6 +138,7 @@ impl Wheels {
             let values = steers.map(|(value, _)| value);
             self.steer_sums.add(steered, &values, &angles, dt_s);
         }
+        has_standing
     }
 
     /// Finds the orders that fit best, for the tests that follow.
@@ -309,30 +311,6 @@ impl Wheels {
         }
     }
 
-    /// True if a wheel hardly turns that should, and others turn as they are told: it may turn the
-    /// body in any way.
-    pub fn has_standing(&self, robot: &Description, map: &ChannelMap, frame: &SensorFrame) -> bool {
-        let expected: [f64; WHEELS] = std::array::from_fn(|wheel| match wheel < self.wheel_count {
-            true => expected_rate(robot, wheel, &frame.command).abs(),
-            false => 0.0,
-        });
-        let least = EXPECTED_MIN * expected.iter().copied().fold(0.0, f64::max);
-        let [mut standing, mut turning] = [false; 2];
-        for (wheel, expected) in expected[..self.wheel_count].iter().enumerate() {
-            let rate = map.wheel_rate(frame, wheel).filter(|rate| rate.is_finite());
-            let Some(rate) = rate.filter(|_| *expected > least) else {
-                continue;
-            };
-            match rate.abs() / expected {
-                // These are other wheels' rates, or of another unit.
-                ratio if ratio > RATIO_MAX => return false,
-                ratio if ratio * RATIO_MAX < 1.0 => standing = true,
-                _ => turning = true,
-            }
-        }
-        standing && turning
-    }
-
     /// Wheels of a group.
     pub fn others(&self, group: Group, wheel: usize) -> impl Iterator<Item = usize> {
         let all = 0..self.wheel_count;
@@ -373,6 +351,26 @@ pub(super) enum Group {
     Alike,
     /// Steered by another angle.
     Steered,
+}
+
+/// True if a wheel hardly turns that should, and others turn as they are told: it may turn the body
+/// in any way. Of each wheel its rate, whether that was measured, and the rate it should have.
+fn has_standing(wheels: impl Iterator<Item = ((f64, bool), f64)> + Clone) -> bool {
+    let fastest = |most: f64, (_, expected): (_, f64)| most.max(expected.abs());
+    let least = EXPECTED_MIN * wheels.clone().fold(0.0, fastest);
+    let [mut standing, mut turning] = [false; 2];
+    for ((rate, is_measured), expected) in wheels {
+        if !is_measured || expected.abs() <= least {
+            continue;
+        }
+        match (rate / expected).abs() {
+            // These are other wheels' rates, or of another unit.
+            ratio if ratio > RATIO_MAX => return false,
+            ratio if ratio * RATIO_MAX < 1.0 => standing = true,
+            _ => turning = true,
+        }
+    }
+    standing && turning
 }
 
 fn is_rolled(rate: &RegressionSums) -> bool {
