@@ -8,7 +8,7 @@ use std::process::Command;
 
 use serde_json::{Map, Value};
 
-use vigil_terminal::output::json;
+use vigil_terminal::output::{json, line};
 
 use crate::machine::{self, output};
 use crate::results::{Raw, Run, SCHEMA_VERSION};
@@ -47,6 +47,8 @@ pub struct Archive {
     host: String,
     /// Names of raw files that are pages to read.
     pages: Vec<String>,
+    /// Whether all lines could be shown.
+    shown: io::Result<()>,
 }
 
 impl Archive {
@@ -82,6 +84,7 @@ impl Archive {
             run,
             host,
             pages: Vec::new(),
+            shown: Ok(()),
         };
         if let Some(folder) = archive.folder() {
             if fs::exists(&folder)? {
@@ -151,7 +154,8 @@ impl Archive {
     /// Adds lines to the summary, and shows them.
     pub fn say(&mut self, lines: &str) {
         match self.outlet {
-            Outlet::Files => println!("{lines}"),
+            Outlet::Files if self.shown.is_ok() => self.shown = line(lines),
+            Outlet::Files => {}
             Outlet::Json => eprintln!("{lines}"),
         }
         self.add(lines);
@@ -194,6 +198,7 @@ impl Archive {
             mut run,
             host,
             pages,
+            shown,
             ..
         } = self;
         run.shrink();
@@ -201,10 +206,14 @@ impl Archive {
         fs::create_dir_all(root().join(&folder))?;
         let path = format!("{folder}/{}.json", run.question);
         fs::write(root().join(&path), run.text())?;
-        println!("\nresult: {path}; `scripts/bench page` brings it into bench/README.md");
-        println!("raw data: {RAW}/{}/", run.question);
+        shown?;
+        line(&format!(
+            "\nresult: {path}; `scripts/bench page` brings it into bench/README.md\n\
+             raw data: {RAW}/{}/",
+            run.question
+        ))?;
         for page in pages {
-            println!("page: {RAW}/{}/{page}", run.question);
+            line(&format!("page: {RAW}/{}/{page}", run.question))?;
         }
         Ok(())
     }

@@ -15,6 +15,7 @@ use vigil_learning::channel_learning::{LabelledChange, Log, TOLD_S, learn};
 use vigil_recording::frames::Run;
 use vigil_robot::channel_model::Model;
 use vigil_robot::{ChannelMap, Description};
+use vigil_terminal::output;
 
 use crate::real_logs::logs;
 
@@ -222,10 +223,11 @@ fn fold(all: &[Labelled], heading: u32, robot: &Description) -> Result<Vec<Judge
     let said: Vec<String> = report.contexts.iter().map(ToString::to_string).collect();
     let thresholds = model.contexts.change.iter().map(|one| one.threshold);
     let thresholds: Vec<f64> = thresholds.collect();
-    println!(
+    output::line(&format!(
         "heading {heading}: {}; threshold {thresholds:.2?}",
         said.join("; ")
-    );
+    ))
+    .map_err(|error| error.to_string())?;
     let judged = left_out.iter().map(|one| judged(one, &model, robot));
     judged.collect()
 }

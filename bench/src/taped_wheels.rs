@@ -17,6 +17,7 @@ use vigil_robot::Description;
 use vigil_robot::channel_model::tree::tree;
 use vigil_robot::channel_model::{Model, Monitor, Observer};
 use vigil_robot::learned::channels::Channels;
+use vigil_terminal::output;
 
 use crate::{quantile, real_logs};
 
@@ -136,7 +137,7 @@ fn learned(robot: &Description, blocks: &[Block], part: usize) -> Result<Model, 
     };
     let (model, report) = learn(&log, robot)?;
     for fault in &report.faults {
-        println!("part {part} left out: {fault}");
+        output::line(&format!("part {part} left out: {fault}"))?;
     }
     Ok(model)
 }

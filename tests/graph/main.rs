@@ -15,6 +15,7 @@ mod harness;
 mod identity;
 mod injection;
 mod killing;
+mod measured;
 mod playback;
 mod realtime;
 mod recount;

@@ -11,6 +11,7 @@ use vigil_diagnosis::Sensors;
 use vigil_diagnosis::identify::IdentifierFilter;
 use vigil_recording::frames::{self, Run};
 use vigil_setup::Setup;
+use vigil_terminal::output;
 
 /// Runs that are hashed, evenly over those that `vigil learn` left out.
 const RUNS: usize = 30;
@@ -41,13 +42,10 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         for filter in filters {
             let hash = hash_runs(setup, sensors, *filter, &runs)?;
             total = fnv1a::hash_u64(total, hash);
-            let line = format!("{hash:016x} {name} {filter}\n");
-            print!("{line}");
-            text.push_str(&line);
+            say(&mut text, &format!("{hash:016x} {name} {filter}"))?;
         }
     }
-    text.push_str(&format!("{total:016x} all\n"));
-    println!("{total:016x} all");
+    say(&mut text, &format!("{total:016x} all"))?;
     let file = root().join("bench/bits.txt");
     if args.keep {
         return Ok(std::fs::write(&file, text)?);
@@ -56,6 +54,13 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         true => Ok(()),
         false => Err("verdicts or actions differ from those of bench/bits.txt".into()),
     }
+}
+
+/// Adds a line to the text, and prints it.
+fn say(text: &mut String, line: &str) -> std::io::Result<()> {
+    text.push_str(line);
+    text.push('\n');
+    output::line(line)
 }
 
 /// The runs, evenly drawn from those that the model was not learned from.

@@ -101,9 +101,9 @@ fn show(args: &Args, outcomes: &[Outcome<'_>], document: &Value) -> Result<(), B
         document["wall_s"].as_f64().unwrap_or(f64::NAN)
     );
     if !(is_whole || args.archive || args.json) {
-        lines(outcomes).iter().for_each(|line| println!("{line}"));
-        println!("\n{last}\nNot archived: only a part was measured.");
-        return Ok(());
+        let all = lines(outcomes).join("\n");
+        let text = format!("{all}\n\n{last}\nNot archived: only a part was measured.");
+        return Ok(output::line(&text)?);
     }
     // A part has a name of its own, so that it does not stand for the whole.
     let parts = args.only.iter().map(|name| name.replace('/', "-"));

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::ground_change::{counts, found};
 use vigil_evaluation::scoring::bounds::binomial;
+use vigil_terminal::output;
 
 /// Answers the question.
 pub fn run() -> Result<(), Box<dyn Error>> {
@@ -25,7 +26,7 @@ pub fn run() -> Result<(), Box<dyn Error>> {
             "| {name} | {count} of {of} | {lower:.3} to {upper:.3} |"
         ));
     }
-    lines.iter().for_each(|line| println!("{line}"));
+    output::line(&lines.join("\n"))?;
     let files: [(String, Value); 2] = [
         ("counts.json".to_owned(), json!(counts)),
         ("runs.json".to_owned(), json!(found)),

@@ -14,6 +14,7 @@ use vigil_bench::simulated;
 use vigil_blocks::SensorFrame;
 use vigil_robot::Injection;
 use vigil_sensor_sim::SensorSource;
+use vigil_terminal::output;
 
 /// Cycles that are counted.
 const CYCLES: u64 = 600;
@@ -103,7 +104,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     }
     let head = "| service | instructions a step | budget | used |\n|---|---|---|---|";
     if args.check {
-        println!("{head}\n{}", lines.join("\n"));
+        output::line(&format!("{head}\n{}", lines.join("\n")))?;
     } else {
         let mut archive = Archive::new("instructions", Outlet::Files)?;
         archive.say(&format!(

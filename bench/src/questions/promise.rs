@@ -14,6 +14,7 @@ use vigil_bench::{load, quantile, root};
 use vigil_diagnosis::detect::{Form, Settings};
 use vigil_evaluation::parallel::in_parallel;
 use vigil_robot::declared::Promise;
+use vigil_terminal::output;
 
 /// Forms that are compared.
 const FORMS: [Form; 2] = [Form::LearnedBias, Form::EDetector];
@@ -48,13 +49,13 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let (mut lines, mut figures) = (Vec::new(), Vec::new());
     if args.hours > 0.0 {
         let (said, found) = law(args.hours)?;
-        said.iter().for_each(|line| println!("{line}"));
+        output::line(&said.join("\n"))?;
         lines.extend(said);
         figures.push(("law.json", found));
     }
     if args.scale > 0.0 {
         let (said, found) = delays(args)?;
-        said.iter().for_each(|line| println!("{line}"));
+        output::line(&said.join("\n"))?;
         lines.extend(said);
         figures.push(("delays.json", found));
     }

@@ -12,6 +12,7 @@ use vigil_bench::real_logs::{Injection, LOGS, Split, healthy, table, tolerances,
 use vigil_evaluation::parallel::in_parallel;
 use vigil_recording::frames::Run;
 use vigil_robot::channel_model::targets;
+use vigil_terminal::output;
 
 /// Which logs.
 #[derive(Debug, clap::Args)]
@@ -34,7 +35,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let (mut lines, mut figures) = (Vec::new(), Vec::new());
     for log in &logs {
         let (said, found) = judged(log)?;
-        said.iter().for_each(|line| println!("{line}"));
+        output::line(&said.join("\n"))?;
         lines.extend(said);
         figures.push((format!("{log}.json"), found));
     }

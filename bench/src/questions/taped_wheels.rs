@@ -8,6 +8,7 @@ use std::error::Error;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::taped_wheels::{figures, looks};
+use vigil_terminal::output;
 
 /// Answers the question.
 pub fn run() -> Result<(), Box<dyn Error>> {
@@ -24,7 +25,7 @@ pub fn run() -> Result<(), Box<dyn Error>> {
             figure.value
         ));
     }
-    lines.iter().for_each(|line| println!("{line}"));
+    output::line(&lines.join("\n"))?;
     let files: [(String, Value); 2] = [
         ("figures.json".to_owned(), json!(found)),
         ("looks.json".to_owned(), json!(looks)),

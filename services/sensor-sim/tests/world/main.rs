@@ -9,3 +9,4 @@ mod hostile;
 mod motion;
 mod rover;
 mod sensors;
+mod socket;

@@ -1,0 +1,7 @@
+//! Tests of recordings.
+
+#![cfg(test)]
+
+mod live;
+mod reader;
+mod written;
