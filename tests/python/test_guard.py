@@ -184,6 +184,22 @@ class Blind(unittest.TestCase):
                 actions = [e["what"] for e in summary["events"] if e["event"] == "action"]
                 self.assertEqual(actions[-1], "stop")
 
+    def test_a_source_that_pauses_ends_nobody(self):
+        with Graph("--source", "socket", "--rate", str(RATE_HZ)) as graph:
+            address = graph.wait_for_socket()
+            to = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+            self.addCleanup(to.close)
+            source = Source(lambda frame: to.sendto(vigil.datagram(frame), str(address)))
+            # Longer than the watchdog lets a service stand still while others go on.
+            pauses_s = [3.0, 2.5]
+            for pause_s in pauses_s:
+                source.good(100)
+                time.sleep(pause_s)
+                source.due = time.monotonic_ns()
+            source.good(100)
+            told = [(e["service"], e["what"]) for e in graph.stop()["events"] if e["event"] in ("watchdog", "restarted")]
+        self.assertEqual(told, [])
+
     def test_fields_of_another_unit_or_sign_are_told_by_the_graph(self):
         def millimetres(frame):
             frame.channel[0], frame.channel[1] = 1000 * frame.channel[0], 1000 * frame.channel[1]

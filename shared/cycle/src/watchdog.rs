@@ -95,7 +95,7 @@ struct Peer {
     reported_ns: u64,
     is_stopping: bool,
     answered: (u64, u64),
-    /// Since when the stage before has moved on and this one has not, ns.
+    /// Since when the stage before has moved on to what this one has not answered, ns.
     behind_since_ns: Option<u64>,
     window_ns: u64,
     window_missed: u64,
@@ -210,7 +210,12 @@ impl Watchdog {
             watched.behind_since_ns = None;
         }
         if let (true, Some(next)) = (has_moved, self.services.get_mut(service + 1)) {
-            next.behind_since_ns.get_or_insert(now_ns);
+            // Services report at instants of their own: the next may have told of the same frame
+            // before, and after the last frame it moves no more.
+            match next.has_answered(answered) {
+                true => next.behind_since_ns = None,
+                false => _ = next.behind_since_ns.get_or_insert(now_ns),
+            }
         }
     }
 
@@ -230,6 +235,11 @@ impl Watchdog {
 }
 
 impl Peer {
+    /// Whether it has answered this frame, or a later one of the same writer.
+    const fn has_answered(&self, (epoch, seq): (u64, u64)) -> bool {
+        self.answered.0 == epoch && self.answered.1 >= seq
+    }
+
     fn examine(&mut self, limits: &WatchdogLimits, now_ns: u64) -> Option<WatchdogFinding> {
         assert!(
             self.started_ns <= now_ns && self.reported_ns <= now_ns,

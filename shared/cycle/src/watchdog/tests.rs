@@ -13,6 +13,8 @@ struct Services {
     watchdog: Watchdog,
     now_ns: u64,
     health: [Health; 3],
+    /// In which order their reports are read.
+    order: [usize; 3],
 }
 
 impl Services {
@@ -27,6 +29,7 @@ impl Services {
             watchdog: Watchdog::new(&SETTINGS, 3, 0),
             now_ns: 0,
             health,
+            order: [0, 1, 2],
         }
     }
 
@@ -39,7 +42,8 @@ impl Services {
         let mut found = Vec::new();
         for _ in 0..ms / 50 {
             self.now_ns += 50 * MS;
-            for (service, health) in self.health.iter_mut().enumerate() {
+            for service in self.order {
+                let health = &mut self.health[service];
                 health.header.seq += 1;
                 health.answered_seq += 5;
                 if change(service, health) {
@@ -175,6 +179,48 @@ fn a_source_at_rest_is_nobodys_failure_nor_is_its_going_on() {
     });
     assert_eq!(found, []);
     assert_eq!(services.run(5000, |_, _| true), []);
+}
+
+#[test]
+fn in_whatever_order_reports_come_the_last_frame_is_nobodys_failure() {
+    let orders = [
+        [0, 1, 2],
+        [0, 2, 1],
+        [1, 0, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [2, 1, 0],
+    ];
+    for order in orders {
+        let mut services = Services::new();
+        services.order = order;
+        services.run(1000, |_, _| true);
+        // Of the last frames some reports are late, too: a service tells of five frames fewer.
+        for late in 0..8_u32 {
+            let last = services.health[0].answered_seq + 5;
+            let mut is_last = true;
+            let found = services.run(2000, |service, health| {
+                let is_late = is_last && late & (1 << service) != 0;
+                health.answered_seq = if is_late { last - 5 } else { last };
+                is_last &= service != order[2];
+                true
+            });
+            assert_eq!(found, [], "order {order:?}, late {late:03b}");
+            assert_eq!(services.run(500, |_, _| true), []);
+        }
+        // One that does not follow is found in every order.
+        let stuck = services.health[1].answered_seq;
+        let found = services.run(1000, |service, health| {
+            health.answered_seq = if service == 0 {
+                health.answered_seq
+            } else {
+                stuck
+            };
+            true
+        });
+        let all: Vec<_> = found.iter().map(|&(_, who, what)| (who, what)).collect();
+        assert_eq!(all, [(1, WatchdogFinding::Logical)], "order {order:?}");
+    }
 }
 
 #[test]
