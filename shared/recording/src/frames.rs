@@ -23,7 +23,7 @@ pub use crate::table::TableError as FramesError;
 
 /// A gap longer than this is refused, s: after a second without frames a detector is blind, so that
 /// a run with such a gap is two.
-const GAP_MAX_S: f64 = 1.0;
+pub const GAP_MAX_S: f64 = 1.0;
 /// Distance between two frames that no ground robot drives, m: 2 m in less than a second. Larger
 /// ones are mostly wrong units.
 const JUMP_M_MAX: f64 = 2.0;

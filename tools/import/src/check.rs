@@ -27,7 +27,6 @@ impl LogDescription {
             let message = format!("{} is out of range: allowed is 1 to 1000 Hz", self.rate_hz);
             return wrong("rate_hz", message);
         }
-        limit("gap_max_s", self.gap_max_s)?;
         limit("hold_max_s", self.hold_max_s)?;
         limit("estimate_s", self.estimate_s)?;
         for (i, channel) in self.channel.iter().enumerate() {

@@ -217,9 +217,6 @@ pub struct LogDescription {
     /// each match of `runs` is one.
     #[serde(default)]
     pub run_column: Option<String>,
-    /// Longest pause of a measured channel, s: a longer one is refused.
-    #[serde(default = "one")]
-    pub gap_max_s: f64,
     /// Longest time for which a value is held, s, 30 if left out: beyond it a command is no longer
     /// known. A robot that gets only changed commands may need more.
     #[serde(default = "thirty")]

@@ -30,7 +30,7 @@ use vigil_blocks::SensorFrame;
 use vigil_robot::Description;
 
 use vigil_recording::FrameWriter;
-use vigil_recording::frames::{Field, Run, fields};
+use vigil_recording::frames::{Field, GAP_MAX_S, Run, fields};
 use vigil_recording::table::TableError;
 
 /// Why a log was refused.
@@ -139,12 +139,13 @@ fn frame(fields: &[(String, Field)], identity: [u64; 2], seq: usize, row: &[f64]
     frame
 }
 
-/// One imported run.
-#[derive(Debug, Clone, PartialEq)]
+/// One imported run. What follows a pause in which nothing was measured, longer than frames of a
+/// run may be apart, is a run of its own.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct ImportedRun {
     /// Its id, from 0 in the order found.
     pub id: u32,
-    /// File or folder that it came from, relative to the log's folder.
+    /// File or folder that it came from, relative to the log's folder, and since when.
     pub name: String,
     /// Frames: time since the first, s, then the values in the order of [`ImportedLog::columns`];
     /// NaN where a channel was not measured. A frame of which nothing was measured is left out.
@@ -171,6 +172,35 @@ pub struct ImportedLog {
     pub runs: Vec<ImportedRun>,
     /// Channels whose delay was estimated, and the delay, s.
     pub delays_s: Vec<(String, f64)>,
+}
+
+/// A run, or what follows a pause in it.
+#[derive(Default)]
+struct Part {
+    /// Its begin since that of the run, s.
+    from_s: f64,
+    rows: Vec<Vec<f64>>,
+}
+
+/// Rows, cut where they are further apart than those of a run may be. A part's times begin with it.
+fn parts(rows: Vec<Vec<f64>>) -> impl Iterator<Item = Part> {
+    let mut parts: Vec<Part> = Vec::new();
+    let mut last_s = f64::NEG_INFINITY;
+    for mut row in rows {
+        let Some(t_s) = row.first_mut() else { continue };
+        if *t_s - last_s > GAP_MAX_S {
+            parts.push(Part {
+                from_s: *t_s,
+                rows: Vec::new(),
+            });
+        }
+        last_s = *t_s;
+        if let Some(part) = parts.last_mut() {
+            *t_s = ((*t_s - part.from_s) * 1e6).round() * 1e-6;
+            part.rows.push(row);
+        }
+    }
+    parts.into_iter()
 }
 
 /// Files of a run that are cut off, each once: several sources may read one file.
@@ -228,6 +258,8 @@ pub fn import(
         let grid = Grid::new(log, &columns, &series, &place.path)?;
         let repeated = columns.iter().zip(&series);
         let repeated = repeated.filter(|(_, series)| series.repeated > 0);
+        let mut parts = parts(grid.rows(log, robot, &columns, &series)?);
+        let first = parts.next().unwrap_or_default();
         runs.push(ImportedRun {
             cut: cut_files(&tables),
             unstamped: tables.iter().filter_map(|t| t.unstamped.clone()).collect(),
@@ -239,10 +271,18 @@ pub fn import(
             repeated: repeated
                 .map(|(column, series)| (column.clone(), series.repeated))
                 .collect(),
-            id: id as u32,
+            id: runs.len() as u32,
             name: place.name(folder),
-            rows: grid.rows(log, robot, &columns, &series)?,
+            rows: first.rows,
         });
+        for part in parts {
+            runs.push(ImportedRun {
+                id: runs.len() as u32,
+                name: format!("{}, {:.2} s on", place.name(folder), part.from_s),
+                rows: part.rows,
+                ..ImportedRun::default()
+            });
+        }
     }
     Ok(ImportedLog {
         columns,

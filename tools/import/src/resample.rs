@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use vigil_recording::frames::GAP_MAX_S;
 use vigil_robot::Description;
 
 use super::ImportError;
@@ -65,7 +66,7 @@ impl Grid {
             .map(|i| vec![(i as f64 * self.period_s * 1e6).round() * 1e-6])
             .collect();
         for (channel, series) in log.in_order(columns).zip(series) {
-            self.check(log, channel, series)?;
+            self.check((log, robot), channel, series)?;
             let is_command = channel.method == Method::Hold;
             let period_s = series.period_s();
             for (i, row) in rows.iter_mut().enumerate() {
@@ -119,23 +120,24 @@ impl Grid {
         }
     }
 
-    /// Refuses a pause of a measured channel that is too long, and a value held for too long.
+    /// Refuses a value held for too long, and a long pause of a channel of the rover, for which the
+    /// last value would stand.
     fn check(
         &self,
-        log: &LogDescription,
+        (log, robot): (&LogDescription, &Description),
         channel: &ChannelSource,
         series: &Series,
     ) -> Result<(), ImportError> {
         let column = channel.column_names();
         let pairs = series.time_s.windows(2).map(|pair| pair[1] - pair[0]);
         if channel.method != Method::Hold {
-            let mut pauses = pairs.enumerate();
-            return match pauses.find(|(_, gap_s)| *gap_s > log.gap_max_s) {
+            let mut pauses = pairs.enumerate().filter(|_| robot.has_fault_models());
+            return match pauses.find(|(_, gap_s)| *gap_s > GAP_MAX_S) {
                 None => Ok(()),
                 Some((at, gap_s)) => {
-                    let limit_s = log.gap_max_s;
                     let message = format!(
-                        "column {column}: a gap of {gap_s:.3} s; gap_max_s allows {limit_s} s"
+                        "column {column}: a gap of {gap_s:.3} s, allowed is {GAP_MAX_S} s: cut the \
+                         run there"
                     );
                     Err(series.wrong(at + 1, message))
                 }

@@ -4,8 +4,9 @@ use std::fs;
 use std::path::Path;
 
 use tempfile::TempDir;
-use vigil_import::{LogDescription, import};
+use vigil_import::{ImportedRun, LogDescription, import};
 use vigil_robot::Description;
+use vigil_robot::description::Kinematics;
 
 const LOG: &str = r#"
 robot = "robot.toml"
@@ -263,11 +264,6 @@ fn numbers_and_units_that_make_no_sense_are_refused_by_their_keys() {
         ),
         (
             "rate_hz = 50.0",
-            "rate_hz = 50.0\ngap_max_s = nan",
-            "gap_max_s: NaN",
-        ),
-        (
-            "rate_hz = 50.0",
             "rate_hz = 50.0\nhold_max_s = 0",
             "hold_max_s: 0",
         ),
@@ -327,7 +323,34 @@ fn the_shipped_descriptions_can_be_read() {
 }
 
 #[test]
-fn a_gap_is_told_by_file_row_and_column_of_the_user() {
+fn what_follows_a_long_pause_is_a_run_of_its_own() {
+    // Nothing is measured for three seconds, then the gyro alone is silent for as long.
+    let [whole, paused] = [[-1.0; 2], [53.0, 56.0]].map(|pause| with_pauses(pause, pause));
+    assert_eq!((whole.len(), paused.len()), (1, 2));
+    assert_eq!((paused[0].id, paused[1].id), (0, 1));
+    let names = [paused[0].name.as_str(), paused[1].name.as_str()];
+    assert!(
+        names[0] == "run0" && names[1].starts_with("run0, 6.0"),
+        "{names:?}"
+    );
+    let times = paused.iter().map(|run| run.rows[0][0]);
+    assert_eq!(times.collect::<Vec<_>>(), [0.0; 2]);
+    let lost = whole[0].rows.len() - paused[0].rows.len() - paused[1].rows.len();
+    assert!((145..=152).contains(&lost), "{lost}");
+    // What was measured after the pause is what the whole log has there.
+    assert_eq!(
+        paused[1].rows.last().unwrap()[1..],
+        whole[0].rows.last().unwrap()[1..]
+    );
+    let partly = with_pauses([-1.0; 2], [53.0, 56.0]);
+    assert_eq!(
+        (partly.len(), partly[0].rows.len()),
+        (1, whole[0].rows.len())
+    );
+}
+
+#[test]
+fn a_gap_of_the_rovers_channels_is_told_by_file_row_and_column_of_the_user() {
     let folder = TempDir::new().unwrap();
     // Rows 200 to 259 are missing; row 100 comes twice.
     write(&folder.path().join("run0"), |text| {
@@ -339,9 +362,11 @@ fn a_gap_is_told_by_file_row_and_column_of_the_user() {
     let mut log = log();
     log.channel[4].delay_s = vigil_import::Delay::Given(0.1);
     log.source[0].device_clock = None;
-    let message = import(&log, &robot(), folder.path())
-        .unwrap_err()
-        .to_string();
+    let robot = Description {
+        kinematics: Kinematics::Ackermann6,
+        ..robot()
+    };
+    let message = import(&log, &robot, folder.path()).unwrap_err().to_string();
     // Two lines before the first row, and the row that comes twice: the one after the gap is 201.
     assert!(
         message.contains("run0/base.csv: row 201: column left: a gap of 1.2"),
@@ -374,8 +399,8 @@ fn rows_out_of_order_are_put_in_order_and_counted() {
     assert!((disorder.back_s - 0.02).abs() < 1e-9, "{disorder:?}");
 }
 
-/// The frames of a run whose rows within these times, s, were not written.
-fn with_pauses(base: [f64; 2], gyro: [f64; 2]) -> Vec<Vec<f64>> {
+/// What is made of a run whose rows within these times, s, were not written.
+fn with_pauses(base: [f64; 2], gyro: [f64; 2]) -> Vec<ImportedRun> {
     let folder = TempDir::new().unwrap();
     let run = folder.path().join("run0");
     write(&run, |text| text);
@@ -403,19 +428,18 @@ fn with_pauses(base: [f64; 2], gyro: [f64; 2]) -> Vec<Vec<f64>> {
     for channel in &mut log.channel {
         channel.delay_s = vigil_import::Delay::Given(0.0);
     }
-    import(&log, &robot(), folder.path()).unwrap().runs[0]
-        .rows
-        .clone()
+    import(&log, &robot(), folder.path()).unwrap().runs
 }
 
 #[test]
 fn what_was_not_measured_in_a_pause_is_not_made_up() {
     let never = [-1.0, -1.0];
-    let whole = with_pauses(never, never);
+    let rows = |base, gyro| with_pauses(base, gyro)[0].rows.clone();
+    let whole = rows(never, never);
     assert!(whole.iter().flatten().all(|value| value.is_finite()));
     // The gyro alone is silent for a quarter of a second: columns v, w, enc_L, enc_R, yaw_rate.
     let pause = [53.0, 53.25];
-    let partly = with_pauses(never, pause);
+    let partly = rows(never, pause);
     assert_eq!(partly.len(), whole.len());
     let silent = partly.iter().filter(|row| row[5].is_nan()).count();
     assert!((9..=13).contains(&silent), "{silent}");
@@ -425,7 +449,7 @@ fn what_was_not_measured_in_a_pause_is_not_made_up() {
             .all(|row| row[3].is_finite() && row[1].is_finite())
     );
     // Nothing is measured: there is no frame.
-    let none = with_pauses(pause, pause);
+    let none = rows(pause, pause);
     let lost = whole.len() - none.len();
     assert!((8..=13).contains(&lost), "{lost}");
     let longest = none.windows(2).map(|pair| pair[1][0] - pair[0][0]);

@@ -232,7 +232,7 @@ fn next(folder: &Path, log: Option<&Path>) -> Vec<String> {
     vec![
         frames,
         format!(
-            "vigil learn --robot {} --frames {} --out {}",
+            "vigil learn --robot {} --frames {} --test-fraction 0 --out {}",
             at("robot.toml"),
             at("frames.csv.gz"),
             at("model.toml")
