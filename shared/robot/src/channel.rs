@@ -32,6 +32,8 @@ pub struct Channel {
     pub noise: Option<f64>,
     /// Tolerance, if it is declared.
     pub tolerance: Option<f64>,
+    /// Whether its level wanders without a fault.
+    pub drifts: bool,
 }
 
 impl Channel {
@@ -46,6 +48,7 @@ impl Channel {
             period: None,
             noise: None,
             tolerance: None,
+            drifts: false,
         }
     }
 
@@ -55,6 +58,7 @@ impl Channel {
             period: further.period,
             noise: further.noise,
             tolerance: further.tolerance,
+            drifts: further.drifts.unwrap_or(further.role == Role::Voltage),
             ..Self::new(further.name.clone(), further.role, &further.unit)
         }
     }

@@ -64,4 +64,8 @@ pub struct FurtherChannel {
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub tolerance: Option<f64>,
+    /// Whether its level wanders without a fault, as that of a battery: then only changes within a
+    /// minute count. Left out: true for a voltage.
+    #[serde(default)]
+    pub drifts: Option<bool>,
 }

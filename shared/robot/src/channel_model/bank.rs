@@ -1,6 +1,8 @@
 //! Every fault of every component, weighed over the last few seconds.
 
 mod drives;
+pub mod pair;
+mod unexplained;
 
 use vigil_checkpoint::{Checkpoint, CheckpointValue};
 use vigil_inference::logspace::log_sum_exp;
@@ -36,9 +38,6 @@ pub const HELD: f64 = 2.0;
 /// much that says.
 const MISSING_S: f64 = 1.0;
 const MISSING: f64 = 30.0;
-/// Deviations of a robot with which something is wrong that no single fault explains, relative to
-/// those of a healthy one.
-pub const UNKNOWN: f64 = 2.0;
 /// The same of the roughness.
 const UNKNOWN_NOISE: f64 = 3.0;
 
@@ -257,7 +256,7 @@ impl Bank {
         for fault in 0..self.declared.len() {
             self.weigh_declared(fault);
         }
-        self.unknown = self.law().log_ratio_scaled(UNKNOWN);
+        self.unknown = self.law().log_ratio_unknown(self.law().square());
         let scatter = self.laws.scatter.as_ref();
         self.unknown_noise = scatter.map_or(IMPOSSIBLE, |scatter| scatter.any(UNKNOWN_NOISE));
         true

@@ -186,6 +186,9 @@ pub struct Channel {
     /// Variance of the residual of one observation: constant, by the square of the command, by the
     /// square of what the prediction has changed by.
     pub variance: VarianceBasis,
+    /// Whether its level wanders without a fault: the prediction is of what departs from that.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub drifts: bool,
     /// Standard deviations of a run's own offset, in the channel's unit, and of its own gain.
     pub context_sd: [f64; 2],
     /// Root mean square of the channel's value in motion.

@@ -56,6 +56,8 @@ pub struct Target {
     pub largest: f64,
     /// What it comes back to the same after, if it is an angle.
     pub period: Option<f64>,
+    /// Whether its level wanders without a fault.
+    pub drifts: bool,
 }
 
 /// Words that no fault may be called by.
@@ -106,6 +108,7 @@ fn predicted(robot: &Description) -> Vec<Target> {
             wheel: None,
             largest: f64::INFINITY,
             period: None,
+            drifts: false,
         }));
     }
     let limits = &robot.limits;
@@ -134,6 +137,7 @@ fn predicted(robot: &Description) -> Vec<Target> {
             wheel: channel.wheel,
             largest,
             period: channel.period,
+            drifts: channel.drifts,
         });
     }
     out

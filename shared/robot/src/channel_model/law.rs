@@ -12,6 +12,7 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use vigil_checkpoint::Checkpoint;
+use vigil_inference::logspace::log_sum_exp;
 
 use super::CHANNELS_MAX;
 
@@ -23,6 +24,9 @@ pub const BLOCK_S: f64 = 0.5;
 /// large fault of one sensor passes for a rough moment of all, with 100 rough moments pass for
 /// faults.
 const FREEDOM: f64 = 30.0;
+/// Deviations of a robot with which something is wrong that no single fault explains, relative to
+/// those of a healthy one: with one factor a gross fault would say hardly more than a small one.
+const UNKNOWN: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
 /// Sweeps over channels that were not measured, by which each gets the mean that the others give.
 const SWEEPS: usize = 3;
 
@@ -375,13 +379,28 @@ impl Law {
         half * ((FREEDOM + square) / (FREEDOM + least)).ln()
     }
 
-    /// The same if all deviations were larger by a factor.
+    /// Square that a change leaves which makes the window so much more likely: at most, as what
+    /// the change costs is in that.
     #[must_use]
-    pub fn log_ratio_scaled(&self, factor: f64) -> f64 {
-        let square = self.square / (factor * factor);
+    pub fn left(&self, log_ratio: f64) -> f64 {
         let half = 0.5 * (FREEDOM + self.values() as f64);
-        half * ((FREEDOM + self.square) / (FREEDOM + square)).ln()
-            - self.values() as f64 * factor.ln()
+        let left = (FREEDOM + self.square) * (-log_ratio.max(0.0) / half).exp();
+        (left - FREEDOM).max(0.0)
+    }
+
+    /// Natural logarithm of how much more likely a window with this square is if something is wrong
+    /// that no single fault explains: all deviations are larger by one of a few factors.
+    #[must_use]
+    pub fn log_ratio_unknown(&self, square: f64) -> f64 {
+        let larger = UNKNOWN.map(|factor| self.log_ratio_larger(square, factor));
+        log_sum_exp(&larger) - (UNKNOWN.len() as f64).ln()
+    }
+
+    /// The same if all deviations are larger by this factor.
+    #[must_use]
+    pub fn log_ratio_larger(&self, square: f64, factor: f64) -> f64 {
+        let less = square * (1.0 - 1.0 / (factor * factor));
+        self.log_ratio_at(square, less) - self.values() as f64 * factor.ln()
     }
 
     /// Scale of the variances that the rest of the window shows, with a square less by `less`.

@@ -21,6 +21,7 @@
 //! | [`context_change`] | changes that are no fault, by labelled runs |
 //! | [`declared_faults`] | the faults that a description declares, weighed |
 //! | [`bank`] | all faults, weighed |
+//! | [`level`] | the level of a channel that wanders without a fault |
 //! | [`belief`] | what is believed of components |
 //! | [`monitor`] | detection, and what is believed of each component |
 //! | [`model`] | the model file |
@@ -48,6 +49,7 @@ pub mod directions;
 pub mod fault_kind;
 mod identity;
 pub mod law;
+pub mod level;
 pub mod model;
 mod model_check;
 pub mod monitor;
@@ -58,6 +60,7 @@ pub mod shift;
 pub mod signature;
 pub mod tree;
 pub mod turning;
+mod watched;
 pub mod window;
 
 pub use channel::{Channel, Regressor, Scales, Term};

@@ -8,26 +8,25 @@
 //! Another rate adds its logarithm afterwards. Alarms do not depend on it, as their threshold moves
 //! by as much.
 
-use vigil_blocks::WHEELS;
 use vigil_checkpoint::Checkpoint;
 use vigil_inference::logspace::{log_add, log_sum_exp};
 
-use super::bank::{Bank, ChannelPlace, DrivePlace, IMPOSSIBLE, KINDS_MAX, Laws, Weighed};
+use super::bank::{Bank, ChannelPlace, DrivePlace, IMPOSSIBLE, KINDS_MAX, Laws};
 use super::belief::{ComponentBelief, NO_BELIEF, PairBelief};
 use super::channel::{Channel, Scales, commands, lags};
-use super::component::{Places, Quantity, Target, components, drives, targets};
+use super::component::{Places, Target, components, drives, targets};
 use super::context_change::ChangeWatch;
 use super::coverage::{Combinations, Range, widening};
 use super::declared_faults::{DeclaredFaults, Taught};
 use super::directions::{covariances, directions};
-use super::fault_kind::{DECLARED_KINDS, DRIVE_KINDS, FaultKind, SENSOR_KINDS};
 use super::law::{BLOCK_S, BLOCKS, Law};
 use super::model::{Class, FAULT_RATE_1_H, Model, Tail};
 use super::observation::History;
 use super::orders::WheelOrders;
 use super::scatter::ScatterLaw;
 use super::signature::terms;
-use super::window::Window;
+use super::watched::{Part, Watch, likeliest, watched};
+use super::window::{Held, Window};
 use super::{AXES, CHANNELS_MAX, COMPONENTS_MAX};
 use crate::description::Description;
 use crate::learned::channels::Channels;
@@ -40,8 +39,11 @@ const BLOCKS_MIN: usize = 2;
 const READY_S: f64 = 1.0;
 /// How much more frequent a fault with labelled runs is than any other. Chosen.
 const RECORDED: f64 = 10.0;
-/// By how much rarer two faults are, each of a wheel of its own, than one, nats. Chosen.
+/// By how much rarer two faults are than one, nats. Chosen.
 const ANOTHER: f64 = 4.0;
+/// How much the logarithm of what a fault leaves unexplained, over what it explains, says against
+/// it. Chosen: no effect of a fault is exactly as described, and twice as much is 16 to 1.
+const DOUBT: f64 = 4.0;
 /// Log-odds of a component from which on it may be broken.
 const SUSPECT_LOG_ODDS: f64 = -2.0;
 
@@ -49,47 +51,6 @@ const SUSPECT_LOG_ODDS: f64 = -2.0;
 type Odds = [f64; COMPONENTS_MAX + 1];
 /// The same by class.
 type ClassOdds = [[f64; Class::ALL.len()]; COMPONENTS_MAX + 1];
-
-/// What a component is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Part {
-    /// A sensor of this quantity.
-    Sensor(Quantity),
-    /// A drive.
-    Drive,
-    /// A declared fault of the robot.
-    Robot,
-}
-
-impl Part {
-    /// Kind behind a place of its faults.
-    fn kind(self, place: usize) -> Option<FaultKind> {
-        let kinds: &[FaultKind] = match self {
-            Self::Sensor(_) => &SENSOR_KINDS,
-            Self::Drive => &DRIVE_KINDS,
-            Self::Robot => &DECLARED_KINDS,
-        };
-        kinds.get(place).copied()
-    }
-
-    const fn quantity(self) -> Option<Quantity> {
-        match self {
-            Self::Sensor(quantity) => Some(quantity),
-            Self::Drive | Self::Robot => None,
-        }
-    }
-}
-
-/// A component at work.
-#[derive(Debug, Clone, Copy, Checkpoint)]
-struct Watch {
-    /// Whether the channels in use show it.
-    is_seen: bool,
-    #[checkpoint(fixed)]
-    part: Part,
-    /// Slot of its evidence.
-    slot: usize,
-}
 
 /// The detection filter, and what names its faults.
 #[derive(Debug, Clone, Checkpoint)]
@@ -114,8 +75,8 @@ pub struct Monitor {
     /// What the prior fault rate adds to the log-odds.
     prior_log_odds: f64,
     run_s: f64,
-    /// Channels, as bits, of which no context is learned: something may be wrong with them.
-    suspects: u64,
+    /// Channels with which something may be wrong.
+    suspects: Held,
     classes: [f64; Class::ALL.len()],
     beliefs: [ComponentBelief; COMPONENTS_MAX],
     pair: Option<PairBelief>,
@@ -175,7 +136,7 @@ impl Monitor {
             tails: Class::ALL.map(tail),
             prior_log_odds: (fault_rate_1_h / FAULT_RATE_1_H).ln(),
             run_s: 0.0,
-            suspects: 0,
+            suspects: Held::default(),
             classes: [IMPOSSIBLE; Class::ALL.len()],
             beliefs: [NO_BELIEF; COMPONENTS_MAX],
             pair: None,
@@ -270,10 +231,8 @@ impl Monitor {
         }
     }
 
-    fn sum_up(&mut self) {
-        let seen = self.watched.iter().filter(|watched| watched.is_seen);
-        let prior = component_prior(seen.count());
-        // Log-odds by component and class, before and after tempering.
+    /// Log-odds by component and class before tempering, and those of components that have none.
+    fn raw(&self, prior: f64) -> (ClassOdds, Odds) {
         let mut raw: ClassOdds = [[IMPOSSIBLE; Class::ALL.len()]; COMPONENTS_MAX + 1];
         let mut certain: Odds = [IMPOSSIBLE; COMPONENTS_MAX + 1];
         for (i, watched) in self.watched.iter().enumerate() {
@@ -291,15 +250,24 @@ impl Monitor {
                 }
             }
         }
-        let n = self.watched.len() + 1;
         let turning = Class::Turning as usize;
-        let recorded = [Class::Signature as usize, turning];
         if let Some(([first, _], further)) = self.pair_components() {
-            raw[n - 1][turning] = raw[first][turning] + further - ANOTHER;
+            raw[self.watched.len()][turning] = raw[first][turning] + further - ANOTHER;
         }
+        (raw, certain)
+    }
+
+    fn sum_up(&mut self) {
+        let seen = self.watched.iter().filter(|watched| watched.is_seen);
+        let prior = component_prior(seen.count());
+        let (raw, certain) = self.raw(prior);
+        let n = self.watched.len() + 1;
+        let recorded = [Class::Signature as usize, Class::Turning as usize];
         let unknown = prior + self.bank.unknown();
-        let mut odds = certain;
-        let mut odds_unknown = IMPOSSIBLE;
+        // Of what the window's means show, of what its noise shows, and of what is certain.
+        let mut odds: Odds = [IMPOSSIBLE; COMPONENTS_MAX + 1];
+        let mut odds_of_noise = certain;
+        let (mut odds_unknown, mut unknown_noise) = (IMPOSSIBLE, IMPOSSIBLE);
         for (class, tail) in self.tails.iter().enumerate() {
             let mut all: Odds = [IMPOSSIBLE; COMPONENTS_MAX + 1];
             for (slot, raw) in all.iter_mut().zip(&raw[..n]) {
@@ -307,8 +275,7 @@ impl Monitor {
             }
             if class == Class::Unknown as usize {
                 self.classes[class] = unknown.max(IMPOSSIBLE);
-                let tempered = tail.as_ref().map_or(unknown, |tail| tail.tempered(unknown));
-                odds_unknown = log_add(odds_unknown, tempered);
+                odds_unknown = tempered(tail.as_ref(), unknown);
                 continue;
             }
             // Noise of several channels at once is of no component.
@@ -318,25 +285,95 @@ impl Monitor {
             };
             let total = log_add(log_sum_exp(&all), of_none).max(IMPOSSIBLE);
             self.classes[class] = total;
-            let (tempered, slope) = tail
-                .as_ref()
-                .map_or((total, 1.0), |tail| (tail.tempered(total), tail.slope));
+            let slope = tail.as_ref().map_or(1.0, |tail| tail.slope);
             // A fault of which there are recordings does occur.
             let tempered = match recorded.contains(&class) {
-                true => tempered + RECORDED.ln(),
-                false => tempered,
+                true => tempered(tail.as_ref(), total) + RECORDED.ln(),
+                false => tempered(tail.as_ref(), total),
             };
             // The likelihoods tell the components apart no better than health from faults.
             let sharpened = all.map(|value| slope * (value - total));
             let none = slope * (of_none - total);
             let sharpened_total = log_add(log_sum_exp(&sharpened[..n]), none);
-            odds_unknown = log_add(odds_unknown, tempered + none - sharpened_total);
-            for (slot, value) in odds.iter_mut().zip(sharpened).take(n) {
+            let slots = match class == Class::Noise as usize {
+                true => {
+                    unknown_noise = tempered + none - sharpened_total;
+                    &mut odds_of_noise
+                }
+                false => &mut odds,
+            };
+            for (slot, value) in slots.iter_mut().zip(sharpened).take(n) {
                 *slot = log_add(*slot, tempered + value - sharpened_total);
             }
         }
         self.divide_declared(&raw[..n], &mut odds[..n]);
-        self.report_odds(&odds, odds_unknown);
+        let of_means = |by_class: &[f64; Class::ALL.len()]| {
+            let all = by_class.iter().enumerate();
+            all.filter(|(class, _)| *class != Class::Noise as usize)
+                .fold(IMPOSSIBLE, |most, (_, log_odds)| log_odds.max(most))
+        };
+        let single = &raw[..self.watched.len() - self.bank.declared().len()];
+        let single = single.iter().map(of_means).fold(IMPOSSIBLE, f64::max);
+        let pair = self.explain(prior, single, (&mut odds[..n], &mut odds_unknown));
+        for (slot, value) in odds.iter_mut().zip(odds_of_noise) {
+            *slot = log_add(*slot, value);
+        }
+        self.report_odds(&odds, log_add(odds_unknown, unknown_noise), pair);
+    }
+
+    /// Divides what the window's means show among declared faults, other single ones, two at once,
+    /// and what none of them explains. What a name leaves has to be as in health, or less than what
+    /// it explains. `single`: log-odds, with this prior, of the likeliest fault that is not
+    /// declared. Returns the components of the two faults.
+    fn explain(
+        &mut self,
+        prior: f64,
+        single: f64,
+        (odds, unknown): (&mut [f64], &mut f64),
+    ) -> Option<[usize; 2]> {
+        let pair = self.bank.weigh_pair();
+        let tail = |class: Class| self.tails[class as usize].as_ref();
+        let first = odds.len() - 1 - self.bank.declared().len();
+        let (single_odds, declared_odds) = odds.split_at_mut(first);
+        let (named, declared) = (log_sum_exp(single_odds), log_sum_exp(declared_odds));
+        let mut total = log_add(log_add(named, declared), *unknown);
+        let mut explained = single - prior;
+        let mut both = None;
+        if let Some(pair) = pair {
+            // No log shows how often two are seen where there is none: they have the tail of
+            // sensors that read anything.
+            let log_odds = tempered(tail(Class::Erratic), prior + pair.log_ratio);
+            total = log_add(total, log_odds - ANOTHER);
+            let slope = tail(Class::Unknown).map_or(1.0, |tail| tail.slope);
+            let more = slope * (pair.log_ratio - explained) - ANOTHER;
+            if more > 0.0 {
+                explained = pair.log_ratio;
+                both = Some((pair.components, more));
+            }
+        }
+        // Labelled runs do not tell all that a declared fault changes: what it leaves says little.
+        let bounded = tempered(tail(Class::Unknown), prior + self.bank.unknown_bounded());
+        let against = declared - log_add(named, bounded);
+        let others = total - log_add(0.0, against);
+        let change = total - log_add(0.0, -against) - declared;
+        declared_odds.iter_mut().for_each(|one| *one += change);
+        let (further, doubt) = self.bank.unknown_beside(explained);
+        let further = tempered(tail(Class::Unknown), prior + further).min(DOUBT * doubt);
+        *unknown = others - log_add(0.0, -further);
+        let (more, of_named) = (
+            both.map_or(IMPOSSIBLE, |(_, more)| more),
+            others - log_add(0.0, further),
+        );
+        let change = of_named - log_add(0.0, more) - named;
+        single_odds.iter_mut().for_each(|one| *one += change);
+        let declared_pair = self.pair_components().map(|(components, _)| components);
+        match (both, declared_odds.last_mut()) {
+            (Some((components, more)), Some(slot)) => {
+                *slot = log_add(*slot, of_named - log_add(0.0, -more));
+                Some(components)
+            }
+            _ => declared_pair,
+        }
     }
 
     /// Components of the two faults for which [`DeclaredFaults::pair`] speaks, and how much.
@@ -359,7 +396,7 @@ impl Monitor {
         declared.divide(slope, &raw[first..], &mut odds[first..]);
     }
 
-    fn report_odds(&mut self, odds: &Odds, unknown: f64) {
+    fn report_odds(&mut self, odds: &Odds, unknown: f64, pair: Option<[usize; 2]>) {
         let n = self.watched.len();
         let mut channels = [IMPOSSIBLE; SLOTS];
         channels[Slot::ANY] = log_add(unknown, odds[n]).max(IMPOSSIBLE);
@@ -374,7 +411,7 @@ impl Monitor {
                 ..likeliest(self.bank.weighed(i), watched.part)
             };
         }
-        self.pair = self.pair_components().map(|(components, _)| PairBelief {
+        self.pair = pair.map(|components| PairBelief {
             p: (odds[n] - total).exp().clamp(0.0, 1.0),
             components,
         });
@@ -384,9 +421,15 @@ impl Monitor {
             part.and_then(Part::quantity).is_none() && is_suspect(i)
         });
         let channels_of = self.bank.components().enumerate();
-        self.suspects = channels_of
-            .filter(|&(_, component)| shared || unknown > SUSPECT_LOG_ODDS || is_suspect(component))
-            .fold(0, |bits, (channel, _)| bits | 1 << channel);
+        let anything = shared || unknown > SUSPECT_LOG_ODDS;
+        self.suspects = channels_of.fold(Held::default(), |held, (channel, component)| {
+            // A charge falls on while something else is wrong.
+            let own = u64::from(is_suspect(component)) << channel;
+            Held {
+                context: held.context | own | u64::from(anything) << channel,
+                level: held.level | own,
+            }
+        });
         let prior = self.prior_log_odds;
         self.report.log_odds = (total + prior).max(IMPOSSIBLE);
         let per_observation = 1.0 / (BLOCKS * self.bank.window().per_block()) as f64;
@@ -395,35 +438,17 @@ impl Monitor {
     }
 }
 
+/// Log-odds of a class by its tail; as they are if none is known.
+fn tempered(tail: Option<&Tail>, log_odds: f64) -> f64 {
+    tail.map_or(log_odds, |tail| tail.tempered(log_odds))
+}
+
 /// Log-odds at [`FAULT_RATE_1_H`] that a fault of one of so many components has begun within a
 /// window; as much is kept for a fault of none of them.
 #[must_use]
 pub fn component_prior(components: usize) -> f64 {
     let shares = 1.0 + components as f64;
     (FAULT_RATE_1_H / 3600.0 * BLOCK_S * BLOCKS as f64 / shares).ln()
-}
-
-/// The components, by what shows them.
-fn watched(at: Places, sensed: &[ChannelPlace], declared: &DeclaredFaults) -> Vec<Watch> {
-    let watch = |i: usize| {
-        let sensor = sensed.iter().find(|sensed| sensed.component == i);
-        let part = match sensor {
-            Some(sensed) => Part::Sensor(sensed.target.quantity),
-            None if i >= at.declared => Part::Robot,
-            None => Part::Drive,
-        };
-        let is_seen = match part {
-            Part::Sensor(_) => true,
-            Part::Drive => i >= at.drives,
-            Part::Robot => declared.is_seen(i - at.declared),
-        };
-        Watch {
-            is_seen,
-            part,
-            slot: sensor.map_or(Slot::ANY, |sensed| slot(&sensed.target)),
-        }
-    };
-    (0..at.all).map(watch).collect()
 }
 
 /// The channels at these places of a description, with their components.
@@ -452,39 +477,6 @@ fn laws(model: &Model, places: &[usize]) -> Option<Laws> {
         mean: mean.collect::<Option<_>>()?,
         scatter: ScatterLaw::new(&model.scatter, places),
     })
-}
-
-/// The most probable kind of a component's fault.
-fn likeliest(weighed: &[Weighed; KINDS_MAX], part: Part) -> ComponentBelief {
-    let mut best = 0;
-    for k in 1..KINDS_MAX {
-        if weighed[k].log_ratio > weighed[best].log_ratio {
-            best = k;
-        }
-    }
-    let Some(kind) = part.kind(best) else {
-        return NO_BELIEF;
-    };
-    ComponentBelief {
-        p: 0.0,
-        kind,
-        size_kind: kind.size_kind(part.quantity()),
-        size: weighed[best].size,
-        size_sd: weighed[best].size_sd,
-        age_s: weighed[best].age_s,
-    }
-}
-
-/// Slot of a channel's evidence.
-fn slot(target: &Target) -> usize {
-    let wheel = target.wheel.unwrap_or(0).min(WHEELS - 1);
-    match target.quantity {
-        Quantity::Forward | Quantity::Lateral | Quantity::Turn => Slot::POSE,
-        Quantity::YawRate => Slot::YAW_RATE,
-        Quantity::WheelRate => Slot::wheel_rate(wheel),
-        Quantity::Current => Slot::current(wheel),
-        Quantity::Other => Slot::further(target.place),
-    }
 }
 
 // Each channel has a place in the arrays of a law.

@@ -4,6 +4,7 @@ use vigil_checkpoint::{Checkpoint, CheckpointValue};
 
 use super::channel::{CLIP, Channel, Commands, Scales};
 use super::law::{BLOCK_S, BLOCKS, Row};
+use super::level::Level;
 use super::observation::History;
 use super::{CHANNELS_MAX, DRIVES_MAX};
 use crate::description::INTERVAL_MIN_S;
@@ -99,6 +100,15 @@ const NOTHING: Moment = Moment {
     offset: [[0.0; CHANNELS_MAX]; DRIVES_MAX],
 };
 
+/// Channels, as bits, with which something may be wrong: what is usual of them is not learned.
+#[derive(Debug, Clone, Copy, Default, CheckpointValue)]
+pub struct Held {
+    /// Whose offset and gain are not learned.
+    pub context: u64,
+    /// Whose level is not followed.
+    pub level: u64,
+}
+
 /// The window. Rows hold the means of its blocks, the oldest first.
 #[derive(Debug, Clone, Checkpoint)]
 pub struct Window {
@@ -113,6 +123,7 @@ pub struct Window {
     ring: Vec<Moment>,
     newest: usize,
     context: [Context; CHANNELS_MAX],
+    level: [Level; CHANNELS_MAX],
     /// Whitened residuals; none where a block holds no reading.
     pub z: [[Option<f64>; BLOCKS]; CHANNELS_MAX],
     /// One over the residual's deviation.
@@ -143,6 +154,7 @@ impl Window {
             ring: vec![NOTHING; RING.min(per_block * (BLOCKS + DELAY_BLOCKS))],
             newest: 0,
             context: [Context::NONE; CHANNELS_MAX],
+            level: [Level::default(); CHANNELS_MAX],
             z: [[None; BLOCKS]; CHANNELS_MAX],
             unit: [[0.0; BLOCKS]; CHANNELS_MAX],
             predicted: [[0.0; BLOCKS]; CHANNELS_MAX],
@@ -175,6 +187,7 @@ impl Window {
     pub fn reset(&mut self) {
         self.clear();
         self.context = [Context::NONE; CHANNELS_MAX];
+        self.level = [Level::default(); CHANNELS_MAX];
     }
 
     /// Begins a new record of the same run.
@@ -189,11 +202,10 @@ impl Window {
         &self.ring[(self.newest + length - lag % length) % length]
     }
 
-    /// Takes the newest observation of `history`; deviations count `widening` times as much. Of the
-    /// channels that are `held` no context is learned.
-    pub fn push(&mut self, history: &History, commands: &Commands, (widening, held): (f64, u64)) {
+    /// Takes the newest observation of `history`; deviations count `widening` times as much.
+    pub fn push(&mut self, history: &History, commands: &Commands, (widening, held): (f64, Held)) {
         let Some(now) = history.ago(0) else { return };
-        self.learn_context(held, now.dt_s);
+        self.learn_context(held.context, now.dt_s);
         self.newest = (self.newest + 1) % self.ring.len();
         let moment_before = match self.ago(1) {
             before if before.is_there => *before,
@@ -204,7 +216,15 @@ impl Window {
         moment.is_there = true;
         moment.moves = now.moving && now.moving_s >= MOVES_S;
         for (i, (place, channel)) in self.channels.iter().enumerate() {
-            let predicted = channel.predict(commands, &self.scales);
+            let mut predicted = channel.predict(commands, &self.scales);
+            if channel.drifts {
+                let apart = now.values[*place].map(|value| value - predicted);
+                let level = &mut self.level[i];
+                predicted += match held.level >> i & 1 {
+                    0 => level.take(apart, now.dt_s),
+                    _ => level.value(),
+                };
+            }
             let before = if was_there { last[i] } else { predicted };
             let basis = Channel::basis(&now.command, &self.scales, predicted, before);
             let unit = 1.0 / (widening * channel.variance_at(basis).sqrt());

@@ -313,6 +313,42 @@ fn a_window_that_has_just_begun_is_judged_by_the_law_of_what_is_there() {
 }
 
 #[test]
+fn what_no_fault_explains_is_weighed_by_the_density_of_wider_laws() {
+    let (law, _) = law();
+    let n = (3 * BLOCKS) as f64;
+    // Of a Student law with 30 degrees of freedom, but for what does not depend on the window.
+    let log_density = |square: f64, factor: f64| {
+        -0.5 * (30.0 + n) * (1.0 + square / (30.0 * factor * factor)).ln() - n * factor.ln()
+    };
+    for square in [0.0, n, 10.0 * n, 1e3 * n, 1e5 * n] {
+        let mut mean = 0.0;
+        for factor in [2.0, 4.0, 8.0, 16.0, 32.0] {
+            let ratio = log_density(square, factor) - log_density(square, 1.0);
+            assert!((law.log_ratio_larger(square, factor) - ratio).abs() < 1e-9);
+            mean += ratio.exp() / 5.0;
+        }
+        assert!((law.log_ratio_unknown(square) - mean.ln()).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn what_a_change_leaves_follows_from_how_much_more_likely_it_makes_the_window() {
+    let (mut law, _) = law();
+    law.take(&[
+        [Some(4.0); BLOCKS],
+        [Some(-3.0); BLOCKS],
+        [Some(0.5); BLOCKS],
+    ]);
+    for share in [0.0, 0.3, 0.99, 1.0] {
+        let less = share * law.square();
+        let left = law.left(law.log_ratio(less, 0.0));
+        assert!((left - (law.square() - less)).abs() < 1e-9 * law.square());
+    }
+    // What speaks against it leaves all.
+    assert_eq!(law.left(-5.0), law.square());
+}
+
+#[test]
 fn what_was_not_measured_takes_the_mean_that_its_block_gives() {
     let (mut law, covariance) = law();
     let now = DMatrix::from_fn(3, 3, |i, j| covariance[(i * BLOCKS, j * BLOCKS)]);

@@ -19,7 +19,7 @@ use vigil_robot::channel_model::law::BLOCKS;
 use vigil_robot::channel_model::signature::{
     Features, Means, Phase, SD_MIN, Signature, Signatures, means, means_count, terms,
 };
-use vigil_robot::channel_model::window::Window;
+use vigil_robot::channel_model::window::{Held, Window};
 use vigil_robot::channel_model::{AXES, Model, Scales};
 
 use super::recognition::{found_unseen, highest, threshold};
@@ -296,7 +296,11 @@ fn samples<'a>(
                     window.clear();
                     continue;
                 }
-                window.push(history, &commands(history), (model.widening(history), 0));
+                window.push(
+                    history,
+                    &commands(history),
+                    (model.widening(history), Held::default()),
+                );
                 let age_s = now.t_ns as f64 * 1e-9 - label.onset_s;
                 let is_whole = window.whole_blocks() == BLOCKS;
                 is_healthy_first |= age_s < 0.0 && is_whole;

@@ -408,6 +408,7 @@ fn weights(
     let mut channel = Channel {
         name: target.name.clone(),
         period: target.period,
+        drifts: target.drifts,
         terms: terms.to_vec(),
         weights: vec![0.0; terms.len()],
         variance: [0.0; 3],

@@ -1,6 +1,7 @@
 //! What is left of a channel: its variance by speed and by change.
 
 use vigil_robot::channel_model::channel::{VarianceBasis, commands};
+use vigil_robot::channel_model::level::Level;
 use vigil_robot::channel_model::{Channel, History, Range, Scales};
 
 use super::record::{FOLDS, Record};
@@ -56,11 +57,19 @@ fn residuals(
     let mut out = Vec::new();
     for (run, record) in records.iter().enumerate() {
         let mut before = None;
+        let (mut level, mut level_of) = (Level::default(), 0);
         for (history, fold) in record.histories.iter().zip(&record.folds) {
             let (Some(model), Some(now)) = (models.get(*fold), history.ago(0)) else {
                 continue;
             };
-            let predicted = model.predict(&commands(history), scales);
+            if *fold != level_of {
+                (level, level_of) = (Level::default(), *fold);
+            }
+            let mut predicted = model.predict(&commands(history), scales);
+            if model.drifts {
+                let apart = now.values[place].map(|value| value - predicted);
+                predicted += level.take(apart, now.dt_s);
+            }
             let last = before
                 .filter(|_| history.ago(1).is_some())
                 .unwrap_or(predicted);

@@ -24,7 +24,8 @@ pub struct ChannelFit {
     pub channel: String,
     /// Its unit.
     pub unit: String,
-    /// Standard deviation of one observation's residual at rest, in that unit.
+    /// Standard deviation of one observation's residual while nothing is commanded, the stopping
+    /// included, in that unit.
     pub residual_sd: f64,
     /// Root mean square of its value in motion, in that unit.
     pub usual: f64,

@@ -1,7 +1,7 @@
 //! The windows of a log, each part seen through the model that has not seen it.
 
 use vigil_robot::channel_model::channel::commands;
-use vigil_robot::channel_model::window::Window;
+use vigil_robot::channel_model::window::{Held, Window};
 use vigil_robot::channel_model::{Model, Scales};
 
 use super::record::Record;
@@ -42,7 +42,11 @@ pub(super) fn windows(
                     window.reset();
                     continue;
                 }
-                window.push(history, &commands(history), (model.widening(history), 0));
+                window.push(
+                    history,
+                    &commands(history),
+                    (model.widening(history), Held::default()),
+                );
                 if record.folds[newest] == fold {
                     take(&Sight {
                         window: &window,

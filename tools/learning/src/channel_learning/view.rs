@@ -140,8 +140,8 @@ impl fmt::Display for View {
         {
             writeln!(
                 f,
-                "\n{}\n  = {prediction}\n  sd {:.5} at rest; usual size {:.5}; on parts left out \
-                 {:.2} times as much",
+                "\n{}\n  = {prediction}\n  sd {:.5} without a command; usual size {:.5}; on parts \
+                 left out {:.2} times as much",
                 learned.name,
                 learned.variance[0].sqrt(),
                 learned.usual,

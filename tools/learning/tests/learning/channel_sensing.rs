@@ -16,7 +16,7 @@ use super::small::small;
 
 const RATE_HZ: f64 = 20.0;
 
-fn robot(has_wheel_rates: bool) -> Description {
+pub fn robot(has_wheel_rates: bool) -> Description {
     small(&format!(
         "measured = {{ pose = true, wheel_rates = {has_wheel_rates}, steer = false }}\n\
          polynomial_order = 1"
@@ -24,7 +24,7 @@ fn robot(has_wheel_rates: bool) -> Description {
 }
 
 /// Command kept up for four seconds each; one of five is rest.
-fn stop_and_go(t_s: f64) -> [f64; 2] {
+pub fn stop_and_go(t_s: f64) -> [f64; 2] {
     let step = (t_s / 4.0) as u64;
     if step % 5 == 4 {
         return [0.0, 0.0];
@@ -34,7 +34,7 @@ fn stop_and_go(t_s: f64) -> [f64; 2] {
 }
 
 /// A run of a robot that follows `obeys` (with a lag of 0.2 s) while told to follow `told`.
-fn run(
+pub fn run(
     id: u32,
     length_s: f64,
     told: impl Fn(f64) -> [f64; 2],
@@ -82,13 +82,13 @@ fn sensed(robot: &Description, mut run: Run) -> Run {
     run
 }
 
-fn learned(robot: &Description) -> Model {
+pub fn learned(robot: &Description) -> Model {
     let runs = [sensed(robot, run(0, 700.0, stop_and_go, stop_and_go))];
     learn(&Log::of_healthy(&runs), robot).unwrap().0
 }
 
 /// First alarm for 24 h between false alarms, s, and the channel with the highest log-odds then.
-fn alarm(model: &Model, robot: &Description, run: &Run) -> Option<(f64, usize)> {
+pub fn alarm(model: &Model, robot: &Description, run: &Run) -> Option<(f64, usize)> {
     let of = (Channels::PoseEncoders, Form::LearnedBias);
     let calibration = model.calibration(of.0, of.1).unwrap();
     let threshold = calibration.alarm_log_odds(24.0, 1.0);

@@ -11,5 +11,7 @@ mod isolability;
 mod learning;
 mod refusals;
 mod rover;
+mod several_faults;
 mod small;
 mod turning_faults;
+mod wandering;

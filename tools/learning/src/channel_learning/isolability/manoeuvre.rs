@@ -3,7 +3,7 @@
 use vigil_robot::channel_model::channel::commands;
 use vigil_robot::channel_model::law::{BLOCK_S, BLOCKS, Law};
 use vigil_robot::channel_model::observation::smoothed;
-use vigil_robot::channel_model::window::{DELAY_BLOCKS, Window};
+use vigil_robot::channel_model::window::{DELAY_BLOCKS, Held, Window};
 use vigil_robot::channel_model::{AXES, History, Model, Observation, Range, Scales};
 
 use super::comparison::Products;
@@ -89,7 +89,11 @@ impl Manoeuvre {
                 *value = Some(channel.predict(&commands(&ahead), scales));
             }
             history.push(now);
-            window.push(&history, &commands(&history), (model.widening(&history), 0));
+            window.push(
+                &history,
+                &commands(&history),
+                (model.widening(&history), Held::default()),
+            );
             last = now;
         }
         let first = BLOCKS - self.blocks;

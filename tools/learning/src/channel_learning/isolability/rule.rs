@@ -2,7 +2,7 @@
 
 use vigil_inference::logspace::log_add;
 use vigil_robot::channel_model::Target;
-use vigil_robot::channel_model::bank::{ERRATIC, IMPOSSIBLE, KINDS_MAX, ONSETS, UNKNOWN};
+use vigil_robot::channel_model::bank::{ERRATIC, IMPOSSIBLE, KINDS_MAX, ONSETS};
 use vigil_robot::channel_model::law::{BLOCKS, Law};
 use vigil_robot::channel_model::model::{Class, Tail};
 
@@ -29,11 +29,7 @@ impl Rule {
     /// Log-odds of no single fault in a window with this square, by class.
     pub fn classes(&self, square: f64) -> [f64; Class::ALL.len()] {
         let mut classes = [IMPOSSIBLE; Class::ALL.len()];
-        let ratio = self
-            .law
-            .log_ratio_at(square, square * (1.0 - 1.0 / (UNKNOWN * UNKNOWN)));
-        let penalty = self.law.values() as f64 * UNKNOWN.ln();
-        classes[Class::Unknown as usize] = self.prior + ratio - penalty;
+        classes[Class::Unknown as usize] = self.prior + self.law.log_ratio_unknown(square);
         classes
     }
 

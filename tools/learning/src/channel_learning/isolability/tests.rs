@@ -27,6 +27,7 @@ fn rule(directions: &[(Vec<f64>, f64)]) -> Rule {
         wheel: None,
         largest: f64::MAX,
         period: None,
+        drifts: false,
     };
     Rule {
         law: Law::new(&directions, directions.len(), 0).unwrap(),
