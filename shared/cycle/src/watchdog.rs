@@ -212,7 +212,7 @@ impl Watchdog {
         if let (true, Some(next)) = (has_moved, self.services.get_mut(service + 1)) {
             // Services report at instants of their own: the next may have told of the same frame
             // before, and after the last frame it moves no more.
-            match next.has_answered(answered) {
+            match next.has_answered(answered.0, answered.1) {
                 true => next.behind_since_ns = None,
                 false => _ = next.behind_since_ns.get_or_insert(now_ns),
             }
@@ -236,7 +236,7 @@ impl Watchdog {
 
 impl Peer {
     /// Whether it has answered this frame, or a later one of the same writer.
-    const fn has_answered(&self, (epoch, seq): (u64, u64)) -> bool {
+    const fn has_answered(&self, epoch: u64, seq: u64) -> bool {
         self.answered.0 == epoch && self.answered.1 >= seq
     }
 

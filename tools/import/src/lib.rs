@@ -174,33 +174,31 @@ pub struct ImportedLog {
     pub delays_s: Vec<(String, f64)>,
 }
 
-/// A run, or what follows a pause in it.
-#[derive(Default)]
-struct Part {
-    /// Its begin since that of the run, s.
-    from_s: f64,
-    rows: Vec<Vec<f64>>,
-}
-
-/// Rows, cut where they are further apart than those of a run may be. A part's times begin with it.
-fn parts(rows: Vec<Vec<f64>>) -> impl Iterator<Item = Part> {
-    let mut parts: Vec<Part> = Vec::new();
-    let mut last_s = f64::NEG_INFINITY;
-    for mut row in rows {
+/// Adds a run, cut where its rows are further apart than those of a run may be. The times of what
+/// follows begin with it; ids go on.
+fn add(runs: &mut Vec<ImportedRun>, mut run: ImportedRun) {
+    let name = run.name.clone();
+    let (mut from_s, mut last_s) = (0.0, 0.0);
+    for mut row in std::mem::take(&mut run.rows) {
         let Some(t_s) = row.first_mut() else { continue };
-        if *t_s - last_s > GAP_MAX_S {
-            parts.push(Part {
-                from_s: *t_s,
-                rows: Vec::new(),
-            });
+        if *t_s - last_s > GAP_MAX_S && !run.rows.is_empty() {
+            from_s = *t_s;
+            let next = ImportedRun {
+                name: format!("{name}, {from_s:.2} s on"),
+                ..ImportedRun::default()
+            };
+            push(runs, std::mem::replace(&mut run, next));
         }
         last_s = *t_s;
-        if let Some(part) = parts.last_mut() {
-            *t_s = ((*t_s - part.from_s) * 1e6).round() * 1e-6;
-            part.rows.push(row);
-        }
+        *t_s = ((*t_s - from_s) * 1e6).round() * 1e-6;
+        run.rows.push(row);
     }
-    parts.into_iter()
+    push(runs, run);
+}
+
+fn push(runs: &mut Vec<ImportedRun>, run: ImportedRun) {
+    let id = runs.len() as u32;
+    runs.push(ImportedRun { id, ..run });
 }
 
 /// Files of a run that are cut off, each once: several sources may read one file.
@@ -258,9 +256,7 @@ pub fn import(
         let grid = Grid::new(log, &columns, &series, &place.path)?;
         let repeated = columns.iter().zip(&series);
         let repeated = repeated.filter(|(_, series)| series.repeated > 0);
-        let mut parts = parts(grid.rows(log, robot, &columns, &series)?);
-        let first = parts.next().unwrap_or_default();
-        runs.push(ImportedRun {
+        let run = ImportedRun {
             cut: cut_files(&tables),
             unstamped: tables.iter().filter_map(|t| t.unstamped.clone()).collect(),
             lacking: tables.iter().filter_map(|t| t.lacking.clone()).collect(),
@@ -271,18 +267,11 @@ pub fn import(
             repeated: repeated
                 .map(|(column, series)| (column.clone(), series.repeated))
                 .collect(),
-            id: runs.len() as u32,
+            id: 0,
             name: place.name(folder),
-            rows: first.rows,
-        });
-        for part in parts {
-            runs.push(ImportedRun {
-                id: runs.len() as u32,
-                name: format!("{}, {:.2} s on", place.name(folder), part.from_s),
-                rows: part.rows,
-                ..ImportedRun::default()
-            });
-        }
+            rows: grid.rows(log, robot, &columns, &series)?,
+        };
+        add(&mut runs, run);
     }
     Ok(ImportedLog {
         columns,

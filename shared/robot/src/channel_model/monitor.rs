@@ -26,7 +26,7 @@ use super::orders::WheelOrders;
 use super::scatter::ScatterLaw;
 use super::signature::terms;
 use super::watched::{Part, Watch, likeliest, watched};
-use super::window::{Held, Window};
+use super::window::{Suspects, Window};
 use super::{AXES, CHANNELS_MAX, COMPONENTS_MAX};
 use crate::description::Description;
 use crate::learned::channels::Channels;
@@ -76,7 +76,7 @@ pub struct Monitor {
     prior_log_odds: f64,
     run_s: f64,
     /// Channels with which something may be wrong.
-    suspects: Held,
+    suspects: Suspects,
     classes: [f64; Class::ALL.len()],
     beliefs: [ComponentBelief; COMPONENTS_MAX],
     pair: Option<PairBelief>,
@@ -136,7 +136,7 @@ impl Monitor {
             tails: Class::ALL.map(tail),
             prior_log_odds: (fault_rate_1_h / FAULT_RATE_1_H).ln(),
             run_s: 0.0,
-            suspects: Held::default(),
+            suspects: Suspects::default(),
             classes: [IMPOSSIBLE; Class::ALL.len()],
             beliefs: [NO_BELIEF; COMPONENTS_MAX],
             pair: None,
@@ -422,10 +422,10 @@ impl Monitor {
         });
         let channels_of = self.bank.components().enumerate();
         let anything = shared || unknown > SUSPECT_LOG_ODDS;
-        self.suspects = channels_of.fold(Held::default(), |held, (channel, component)| {
+        self.suspects = channels_of.fold(Suspects::default(), |held, (channel, component)| {
             // A charge falls on while something else is wrong.
             let own = u64::from(is_suspect(component)) << channel;
-            Held {
+            Suspects {
                 context: held.context | own | u64::from(anything) << channel,
                 level: held.level | own,
             }

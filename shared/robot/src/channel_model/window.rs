@@ -102,7 +102,7 @@ const NOTHING: Moment = Moment {
 
 /// Channels, as bits, with which something may be wrong: what is usual of them is not learned.
 #[derive(Debug, Clone, Copy, Default, CheckpointValue)]
-pub struct Held {
+pub struct Suspects {
     /// Whose offset and gain are not learned.
     pub context: u64,
     /// Whose level is not followed.
@@ -203,7 +203,12 @@ impl Window {
     }
 
     /// Takes the newest observation of `history`; deviations count `widening` times as much.
-    pub fn push(&mut self, history: &History, commands: &Commands, (widening, held): (f64, Held)) {
+    pub fn push(
+        &mut self,
+        history: &History,
+        commands: &Commands,
+        (widening, held): (f64, Suspects),
+    ) {
         let Some(now) = history.ago(0) else { return };
         self.learn_context(held.context, now.dt_s);
         self.newest = (self.newest + 1) % self.ring.len();

@@ -19,7 +19,7 @@ use vigil_robot::channel_model::law::BLOCKS;
 use vigil_robot::channel_model::signature::{
     Features, Means, Phase, SD_MIN, Signature, Signatures, means, means_count, terms,
 };
-use vigil_robot::channel_model::window::{Held, Window};
+use vigil_robot::channel_model::window::{Suspects, Window};
 use vigil_robot::channel_model::{AXES, Model, Scales};
 
 use super::recognition::{found_unseen, highest, threshold};
@@ -299,7 +299,7 @@ fn samples<'a>(
                 window.push(
                     history,
                     &commands(history),
-                    (model.widening(history), Held::default()),
+                    (model.widening(history), Suspects::default()),
                 );
                 let age_s = now.t_ns as f64 * 1e-9 - label.onset_s;
                 let is_whole = window.whole_blocks() == BLOCKS;

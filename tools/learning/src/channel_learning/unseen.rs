@@ -1,7 +1,7 @@
 //! The windows of a log, each part seen through the model that has not seen it.
 
 use vigil_robot::channel_model::channel::commands;
-use vigil_robot::channel_model::window::{Held, Window};
+use vigil_robot::channel_model::window::{Suspects, Window};
 use vigil_robot::channel_model::{Model, Scales};
 
 use super::record::Record;
@@ -45,7 +45,7 @@ pub(super) fn windows(
                 window.push(
                     history,
                     &commands(history),
-                    (model.widening(history), Held::default()),
+                    (model.widening(history), Suspects::default()),
                 );
                 if record.folds[newest] == fold {
                     take(&Sight {

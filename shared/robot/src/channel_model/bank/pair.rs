@@ -25,8 +25,8 @@ impl Bank {
     /// window is explained without a second one.
     ///
     /// With the readings of sensor A left out, the law of all others is a marginal one, but for
-    /// what other blocks tell of A's. So the likelihood of A and B is that of A saying nothing times
-    /// that of B without A's channels.
+    /// what other blocks tell of A's. So the likelihood of A and B is that of A saying nothing,
+    /// times that of B without A's channels.
     pub fn weigh_pair(&mut self) -> Option<FaultPair> {
         let erratic = SENSOR_KINDS
             .iter()

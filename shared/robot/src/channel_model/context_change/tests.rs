@@ -2,7 +2,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::channel::{Channel, Regressor, Scales, Term, commands};
 use super::super::observation::{History, Observation};
-use super::super::window::Held;
+use super::super::window::Suspects;
 use super::super::{AXES, law::BLOCK_S};
 use super::*;
 
@@ -185,7 +185,7 @@ fn window<const C: usize>(predicted: [f64; C], readings: &[[Option<f64>; C]]) ->
             moving: true,
             ..Observation::default()
         });
-        window.push(&history, &commands(&history), (1.0, Held::default()));
+        window.push(&history, &commands(&history), (1.0, Suspects::default()));
     }
     window
 }

@@ -3,7 +3,7 @@
 use vigil_robot::channel_model::channel::commands;
 use vigil_robot::channel_model::law::{BLOCK_S, BLOCKS, Law};
 use vigil_robot::channel_model::observation::smoothed;
-use vigil_robot::channel_model::window::{DELAY_BLOCKS, Held, Window};
+use vigil_robot::channel_model::window::{DELAY_BLOCKS, Suspects, Window};
 use vigil_robot::channel_model::{AXES, History, Model, Observation, Range, Scales};
 
 use super::comparison::Products;
@@ -92,7 +92,7 @@ impl Manoeuvre {
             window.push(
                 &history,
                 &commands(&history),
-                (model.widening(&history), Held::default()),
+                (model.widening(&history), Suspects::default()),
             );
             last = now;
         }
