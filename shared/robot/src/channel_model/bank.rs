@@ -174,6 +174,11 @@ impl Bank {
         self.silent_s = [0.0; CHANNELS_MAX];
         self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
         (self.unknown, self.unknown_noise) = (IMPOSSIBLE, IMPOSSIBLE);
+        // The others take a window before they are asked.
+        self.first = 0;
+        if let Some(law) = self.laws.mean.first_mut() {
+            law.clear();
+        }
     }
 
     /// The window, to be filled.

@@ -219,6 +219,14 @@ impl Law {
         }
     }
 
+    /// Forgets the window.
+    pub fn clear(&mut self) {
+        self.z = [[0.0; BLOCKS]; CHANNELS_MAX];
+        self.read = [[0.0; BLOCKS]; CHANNELS_MAX];
+        self.gradient = [[0.0; BLOCKS]; CHANNELS_MAX];
+        self.square = 0.0;
+    }
+
     /// The residuals of a channel, completed.
     #[must_use]
     pub fn row(&self, channel: usize) -> &Row {

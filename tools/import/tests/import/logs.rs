@@ -424,7 +424,8 @@ fn with_pauses(base: [f64; 2], gyro: [f64; 2]) -> Vec<ImportedRun> {
     cut("base.csv", 2, ';', 1e-3, base);
     cut("gyro.csv", 1, ',', 1.0, gyro);
     let mut log = log();
-    // Both clocks as they are.
+    // Both clocks as they are, and none that wraps within a pause.
+    log.source[0].device_clock = None;
     for channel in &mut log.channel {
         channel.delay_s = vigil_import::Delay::Given(0.0);
     }
