@@ -95,8 +95,10 @@ struct Peer {
     reported_ns: u64,
     is_stopping: bool,
     answered: (u64, u64),
-    /// Since when the stage before has moved on to what this one has not answered, ns.
-    behind_since_ns: Option<u64>,
+    /// For how long the stage before has moved on and this one has not, ns.
+    behind_ns: Option<u64>,
+    /// When the stage before moved on last, ns.
+    input_moved_ns: u64,
     window_ns: u64,
     window_missed: u64,
     missed: u64,
@@ -154,7 +156,7 @@ impl Watchdog {
                 watched.started_ns += since_ns;
                 watched.reported_ns += since_ns;
                 (watched.window_ns, watched.window_missed) = (now_ns, watched.missed);
-                watched.behind_since_ns = None;
+                watched.behind_ns = None;
             }
         }
     }
@@ -207,15 +209,10 @@ impl Watchdog {
         let has_moved = !is_first && answered != watched.answered;
         watched.answered = answered;
         if is_first || has_moved {
-            watched.behind_since_ns = None;
+            watched.behind_ns = None;
         }
         if let (true, Some(next)) = (has_moved, self.services.get_mut(service + 1)) {
-            // Services report at instants of their own: the next may have told of the same frame
-            // before, and after the last frame it moves no more.
-            match next.has_answered(answered.0, answered.1) {
-                true => next.behind_since_ns = None,
-                false => _ = next.behind_since_ns.get_or_insert(now_ns),
-            }
+            next.input_moved(now_ns);
         }
     }
 
@@ -235,9 +232,23 @@ impl Watchdog {
 }
 
 impl Peer {
-    /// Whether it has answered this frame, or a later one of the same writer.
-    const fn has_answered(&self, epoch: u64, seq: u64) -> bool {
-        self.answered.0 == epoch && self.answered.1 >= seq
+    /// The stage before has moved on. Services report at instants of their own, so that this one may
+    /// have told of the same frame before: only further moves say that it is behind, and a pause
+    /// between two of them says nothing.
+    fn input_moved(&mut self, now_ns: u64) {
+        let since_ns = now_ns - self.input_moved_ns.min(now_ns);
+        let has_reported = self.reported_ns >= self.input_moved_ns;
+        self.behind_ns = self.behind_ns.map_or(Some(0), |behind_ns| {
+            let most_ns = LOOK_NS_MAX.max(self.period_ns.saturating_mul(2));
+            // It goes on reporting all the while: silence is another failure.
+            let more_ns = if has_reported {
+                since_ns.min(most_ns)
+            } else {
+                0
+            };
+            Some(behind_ns + more_ns)
+        });
+        self.input_moved_ns = now_ns;
     }
 
     fn examine(&mut self, limits: &WatchdogLimits, now_ns: u64) -> Option<WatchdogFinding> {
@@ -258,11 +269,7 @@ impl Peer {
         if limits.alive_ns > 0 && since(self.reported_ns) > limits.alive_ns {
             return Some(WatchdogFinding::Alive);
         }
-        // It goes on reporting all the while: silence is another failure.
-        let stood_still_ns = self
-            .behind_since_ns
-            .map_or(0, |behind_ns| self.reported_ns.saturating_sub(behind_ns));
-        if limits.logical_ns > 0 && stood_still_ns > limits.logical_ns {
+        if limits.logical_ns > 0 && self.behind_ns.unwrap_or(0) > limits.logical_ns {
             return Some(WatchdogFinding::Logical);
         }
         let misses = limits.missed_share > 0.0 && self.misses(limits.missed_share, now_ns);
