@@ -232,9 +232,9 @@ impl Watchdog {
 }
 
 impl Peer {
-    /// The stage before has moved on. Services report at instants of their own, so that this one may
-    /// have told of the same frame before: only further moves say that it is behind, and a pause
-    /// between two of them says nothing.
+    /// The stage before has moved on. Services report at instants of their own, so that this one
+    /// may have told of the same frame before: only further moves say that it is behind, and a
+    /// pause between two of them says nothing.
     fn input_moved(&mut self, now_ns: u64) {
         let since_ns = now_ns - self.input_moved_ns.min(now_ns);
         let has_reported = self.reported_ns >= self.input_moved_ns;
