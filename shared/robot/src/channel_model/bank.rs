@@ -38,7 +38,8 @@ pub const HELD: f64 = 2.0;
 /// much that says.
 const MISSING_S: f64 = 1.0;
 const MISSING: f64 = 30.0;
-/// The same of the roughness.
+/// Roughness of a robot of which several channels are noisier at once, relative to that of a
+/// healthy one.
 const UNKNOWN_NOISE: f64 = 3.0;
 
 /// What the window says of a fault.

@@ -11,9 +11,9 @@ use crate::channel_model::{CHANNELS_MAX, COMPONENTS_MAX};
 /// for. Chosen: what a window of health seldom has.
 const UNEXPLAINED: f64 = 3.0;
 
-/// Two faults at once.
+/// Two faults at once of which one is a sensor's.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FaultPair {
+pub struct SensorPair {
     /// Their components: the sensor, then the other.
     pub components: [usize; 2],
     /// Logarithm of how much more likely the window is with both than without a fault.
@@ -27,7 +27,11 @@ impl Bank {
     /// With the readings of sensor A left out, the law of all others is a marginal one, but for
     /// what other blocks tell of A's. So the likelihood of A and B is that of A saying nothing,
     /// times that of B without A's channels.
-    pub fn weigh_pair(&mut self) -> Option<FaultPair> {
+    pub fn weigh_pair(&mut self) -> Option<SensorPair> {
+        let values = self.law().values() as f64;
+        if self.law().square() <= UNEXPLAINED * values {
+            return None;
+        }
         let erratic = SENSOR_KINDS
             .iter()
             .position(|kind| *kind == FaultKind::Erratic)?;
@@ -45,10 +49,6 @@ impl Bank {
                 *row = [None; BLOCKS];
             }
         });
-        let values = self.law().values() as f64;
-        if self.law().square() <= UNEXPLAINED * values {
-            return None;
-        }
         let of_first = silence(self, first);
         let whole = self.weighed;
         let index = self.first.min(self.laws.mean.len() - 1);
@@ -58,7 +58,7 @@ impl Bank {
             .flatten();
         self.laws.mean[index].take(&self.window.z[..n]);
         self.weighed = whole;
-        second.map(|(second, log_ratio)| FaultPair {
+        second.map(|(second, log_ratio)| SensorPair {
             components: [first, second],
             log_ratio: of_first + log_ratio,
         })
