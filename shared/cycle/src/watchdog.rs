@@ -97,8 +97,9 @@ struct Peer {
     answered: (u64, u64),
     /// For how long the stage before has moved on and this one has not, ns.
     behind_ns: Option<u64>,
-    /// When the stage before moved on last, ns.
+    /// When the stage before moved on last, ns, and how long after the time before.
     input_moved_ns: u64,
+    input_interval_ns: u64,
     window_ns: u64,
     window_missed: u64,
     missed: u64,
@@ -155,6 +156,7 @@ impl Watchdog {
             for watched in &mut self.services {
                 watched.started_ns += since_ns;
                 watched.reported_ns += since_ns;
+                watched.input_moved_ns += since_ns;
                 (watched.window_ns, watched.window_missed) = (now_ns, watched.missed);
                 watched.behind_ns = None;
             }
@@ -234,21 +236,18 @@ impl Watchdog {
 impl Peer {
     /// The stage before has moved on. Services report at instants of their own, so that this one
     /// may have told of the same frame before: only further moves say that it is behind, and a
-    /// pause between two of them says nothing.
+    /// pause between two of them, much longer than the one before, says nothing.
     fn input_moved(&mut self, now_ns: u64) {
-        let since_ns = now_ns - self.input_moved_ns.min(now_ns);
+        let since_ns = now_ns.saturating_sub(self.input_moved_ns);
+        let is_pause = since_ns > LOOK_NS_MAX.max(self.input_interval_ns.saturating_mul(2));
+        // It goes on reporting all the while: silence is another failure.
         let has_reported = self.reported_ns >= self.input_moved_ns;
-        self.behind_ns = self.behind_ns.map_or(Some(0), |behind_ns| {
-            let most_ns = LOOK_NS_MAX.max(self.period_ns.saturating_mul(2));
-            // It goes on reporting all the while: silence is another failure.
-            let more_ns = if has_reported {
-                since_ns.min(most_ns)
-            } else {
-                0
-            };
-            Some(behind_ns + more_ns)
-        });
-        self.input_moved_ns = now_ns;
+        let more_ns = match has_reported && !is_pause {
+            true => since_ns,
+            false => 0,
+        };
+        self.behind_ns = Some(self.behind_ns.map_or(0, |behind_ns| behind_ns + more_ns));
+        (self.input_moved_ns, self.input_interval_ns) = (now_ns, since_ns);
     }
 
     fn examine(&mut self, limits: &WatchdogLimits, now_ns: u64) -> Option<WatchdogFinding> {

@@ -224,6 +224,37 @@ fn in_whatever_order_reports_come_the_last_frame_is_nobodys_failure() {
 }
 
 #[test]
+fn of_a_slow_source_too_a_pause_is_nobodys_failure_and_a_service_that_stands_still_is_found() {
+    for order in [[0, 1, 2], [2, 1, 0], [1, 0, 2]] {
+        let mut services = Services::new();
+        services.order = order;
+        // A frame a second, and the number of those before a pause.
+        let (mut source, mut left) = (0, 20);
+        let mut stuck = None;
+        let mut of_second = |services: &mut Services, stuck: Option<u64>| {
+            left -= 1;
+            source += u64::from(left > 0 || left < -5);
+            services.run(1000, |service, health| {
+                health.answered_seq = match stuck {
+                    Some(seq) if service == 1 => seq,
+                    _ => source,
+                };
+                true
+            })
+        };
+        for _ in 0..40 {
+            assert_eq!(of_second(&mut services, stuck), [], "{order:?}");
+        }
+        stuck = Some(services.health[1].answered_seq);
+        let found: Vec<_> = (0..3)
+            .flat_map(|_| of_second(&mut services, stuck))
+            .map(|(_, service, what)| (service, what))
+            .collect();
+        assert_eq!(found, [(1, WatchdogFinding::Logical)], "{order:?}");
+    }
+}
+
+#[test]
 fn time_in_which_nobody_looked_is_held_against_nobody() {
     let mut services = Services::new();
     services.run(1000, |_, _| true);

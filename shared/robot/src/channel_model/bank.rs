@@ -1,5 +1,6 @@
 //! Every fault of every component, weighed over the last few seconds.
 
+mod declared;
 mod drives;
 pub mod pair;
 mod unexplained;
@@ -9,13 +10,14 @@ use vigil_inference::logspace::log_sum_exp;
 
 use super::component::Target;
 use super::declared_faults::DeclaredFaults;
-use super::fault_kind::{DECLARED_KINDS, FaultKind, GAIN_SD, SENSOR_KINDS, bias_sd};
+use super::fault_kind::{FaultKind, GAIN_SD, SENSOR_KINDS, bias_sd};
 use super::law::{BLOCKS, Change, Law, Row};
 use super::orders::WheelOrders;
 use super::scatter::ScatterLaw;
 use super::signature::Terms;
 use super::window::{DELAY_BLOCKS, Window};
 use super::{CHANNELS_MAX, COMPONENTS_MAX};
+use pair::SensorPair;
 
 /// Kinds of a component at most.
 pub const KINDS_MAX: usize = SENSOR_KINDS.len();
@@ -107,6 +109,10 @@ pub struct Laws {
     /// The law of windows that begin with each block.
     #[checkpoint(each)]
     pub mean: Vec<Law>,
+    /// The law of whole windows in which a sensor's channels have nothing to do with the others, by
+    /// its component.
+    #[checkpoint(fixed)]
+    pub without: Vec<Law>,
     /// None if the log does not tell it.
     #[checkpoint(each)]
     pub scatter: Option<ScatterLaw>,
@@ -127,6 +133,9 @@ pub struct Bank {
     first_declared: usize,
     silent_s: [f64; CHANNELS_MAX],
     weighed: [[Weighed; KINDS_MAX]; COMPONENTS_MAX],
+    /// Component without whose channels the window is being weighed.
+    left_out: Option<usize>,
+    pair: Option<SensorPair>,
     unknown: f64,
     unknown_noise: f64,
 }
@@ -151,6 +160,8 @@ impl Bank {
             first_declared,
             silent_s: [0.0; CHANNELS_MAX],
             weighed: [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX],
+            left_out: None,
+            pair: None,
             unknown: IMPOSSIBLE,
             unknown_noise: IMPOSSIBLE,
         }
@@ -175,6 +186,7 @@ impl Bank {
         self.silent_s = [0.0; CHANNELS_MAX];
         self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
         (self.unknown, self.unknown_noise) = (IMPOSSIBLE, IMPOSSIBLE);
+        self.pair = None;
         // The others take a window before they are asked.
         self.first = 0;
         if let Some(law) = self.laws.mean.first_mut() {
@@ -225,7 +237,10 @@ impl Bank {
 
     /// The law of the window as it is.
     fn law(&self) -> &Law {
-        &self.laws.mean[self.first.min(self.laws.mean.len() - 1)]
+        match self.left_out {
+            Some(component) => &self.laws.without[component],
+            None => &self.laws.mean[self.first.min(self.laws.mean.len() - 1)],
+        }
     }
 
     /// Takes what the wheels show up to the end of an observation that lasted `dt_s`.
@@ -240,6 +255,7 @@ impl Bank {
         let n = self.channels.len();
         self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
         (self.unknown, self.unknown_noise) = (IMPOSSIBLE, IMPOSSIBLE);
+        self.pair = None;
         self.first = BLOCKS - self.window.whole_blocks();
         let Some(law) = self.laws.mean.get_mut(self.first) else {
             return false;
@@ -262,7 +278,9 @@ impl Bank {
         for fault in 0..self.declared.len() {
             self.weigh_declared(fault);
         }
-        self.unknown = self.law().log_ratio_unknown(self.law().square());
+        self.weigh_pair();
+        let law = self.law();
+        self.unknown = law.log_ratio_unknown(law.square(), law.parts());
         let scatter = self.laws.scatter.as_ref();
         self.unknown_noise = scatter.map_or(IMPOSSIBLE, |scatter| scatter.any(UNKNOWN_NOISE));
         true
@@ -346,45 +364,6 @@ impl Bank {
             .fold(0.0, |sum, unit| sum + unit / BLOCKS as f64);
         let deviation = if units > 0.0 { 1.0 / units } else { 0.0 };
         bias_sd(self.channels[channel].usual, deviation)
-    }
-
-    fn weigh_declared(&mut self, fault: usize) {
-        let component = self.first_declared + fault;
-        for (k, kind) in DECLARED_KINDS.into_iter().enumerate() {
-            self.weighed[component][k] = match kind {
-                FaultKind::Shift => self.shifted(fault),
-                FaultKind::Signature if !self.declared.is_turning(fault) => self.recognized(fault),
-                FaultKind::Turning if self.declared.is_turning(fault) => self.recognized(fault),
-                _ => Weighed::NONE,
-            };
-        }
-    }
-
-    /// A declared fault by its labelled runs.
-    fn recognized(&self, fault: usize) -> Weighed {
-        // No evidence says nothing of a fault, and is no rare event.
-        let found = self.declared.evidence(fault).filter(|found| *found > 0.0);
-        found.map_or(Weighed::NONE, |log_ratio| Weighed {
-            log_ratio,
-            age_s: self.window.block_s() * BLOCKS as f64,
-            ..Weighed::NONE
-        })
-    }
-
-    /// A declared fault by the channels in which it shows.
-    fn shifted(&self, fault: usize) -> Weighed {
-        let Some(shift) = self.declared.shift(fault, self.first) else {
-            return Weighed::NONE;
-        };
-        let unit = |channel: usize| (self.window.unit[channel], self.bias_sd(channel));
-        Weighed::over(JOINT_ONSETS.map(|first| {
-            let found = shift.weigh(self.law(), first, unit);
-            Weighed {
-                log_ratio: self.law().log_ratio(found.less, found.penalty),
-                age_s: self.window.block_s() * self.law().blocks(first) as f64,
-                ..Weighed::NONE
-            }
-        }))
     }
 
     /// More noise of some channels.

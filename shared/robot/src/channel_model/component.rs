@@ -164,6 +164,14 @@ pub fn unfit(robot: &Description) -> Option<String> {
             "a channel cannot be called '{name}': the name is taken"
         ));
     }
+    let both = |one: &&Target| one.drifts && one.period.is_some();
+    if let Some(both) = all.iter().find(both) {
+        let name = &both.name;
+        return Some(format!(
+            "channel '{name}' has a period and drifts: allowed is one of both, as the level of an \
+             angle has no mean"
+        ));
+    }
     let found = robot.fault.len();
     if found > DECLARED_MAX {
         return Some(format!("{found} faults: allowed are {DECLARED_MAX}"));

@@ -62,6 +62,21 @@ fn is_process(direction: &Direction) -> bool {
     matrix.cholesky().is_some()
 }
 
+/// Covariances by lag of channels of which some have nothing to do with the others: these then have
+/// their marginal law.
+#[must_use]
+pub fn parted(covariances: &[DMatrix<f64>], is_apart: impl Fn(usize) -> bool) -> Vec<DMatrix<f64>> {
+    let of_lag = |whole: &DMatrix<f64>| {
+        DMatrix::from_fn(whole.nrows(), whole.ncols(), |i, j| {
+            match is_apart(i) == is_apart(j) {
+                true => whole[(i, j)],
+                false => 0.0,
+            }
+        })
+    };
+    covariances.iter().map(of_lag).collect()
+}
+
 /// The covariances by lag of the channels at `places`, of which these are the directions.
 #[must_use]
 pub fn covariances(directions: &[Direction], places: &[usize]) -> Vec<DMatrix<f64>> {

@@ -7,6 +7,17 @@ use crate::context_table::DeclaredContext;
 use crate::description::Description;
 use crate::fault_table::DeclaredFault;
 
+/// What tells one channel from another.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ChannelIdentity {
+    /// Its name.
+    pub name: String,
+    /// What it comes back to the same after, if it is an angle.
+    pub period: Option<f64>,
+    /// Whether its level wanders.
+    pub drifts: bool,
+}
+
 /// All that a model and a description must have in common.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Identity {
@@ -14,8 +25,8 @@ pub(super) struct Identity {
     pub name: String,
     /// Of the command's axes.
     pub axes: Vec<String>,
-    /// Names and periods.
-    pub channels: Vec<(String, Option<f64>)>,
+    /// The channels.
+    pub channels: Vec<ChannelIdentity>,
     /// Interval of observations, s.
     pub interval_s: f64,
     /// First seconds of a run that are left out.
@@ -29,11 +40,15 @@ pub(super) struct Identity {
 impl Identity {
     /// Of a robot by its description.
     pub fn of_robot(robot: &Description) -> Self {
-        let channels = targets(robot).into_iter();
+        let channels = targets(robot).into_iter().map(|one| ChannelIdentity {
+            name: one.name,
+            period: one.period,
+            drifts: one.drifts,
+        });
         Self {
             name: robot.name.clone(),
             axes: robot.command.iter().map(|axis| axis.name.clone()).collect(),
-            channels: channels.map(|one| (one.name, one.period)).collect(),
+            channels: channels.collect(),
             interval_s: robot.interval_s,
             warm_up_s: robot.warm_up_s,
             faults: without_groups(&robot.fault),
@@ -55,10 +70,13 @@ pub(super) fn without_groups(faults: &[DeclaredFault]) -> Vec<DeclaredFault> {
 impl fmt::Display for Identity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "command {}; channels", self.axes.join(" "))?;
-        for (name, period) in &self.channels {
-            write!(f, " {name}")?;
-            if let Some(period) = period {
+        for channel in &self.channels {
+            write!(f, " {}", channel.name)?;
+            if let Some(period) = channel.period {
                 write!(f, " (period {period})")?;
+            }
+            if channel.drifts {
+                write!(f, " (drifts)")?;
             }
         }
         write!(f, "; {} s", self.interval_s)?;

@@ -27,6 +27,8 @@ const FREEDOM: f64 = 30.0;
 /// Deviations of a robot with which something is wrong that no single fault explains, relative to
 /// those of a healthy one: with one factor a gross fault would say hardly more than a small one.
 const UNKNOWN: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
+/// Blocks of the window from which on it may be so: what has just begun is a small part of it.
+const UNKNOWN_ONSETS: [usize; 4] = [0, 4, 6, 7];
 /// Sweeps over channels that were not measured, by which each gets the mean that the others give.
 const SWEEPS: usize = 3;
 
@@ -63,12 +65,25 @@ impl Direction {
 fn inverse(square: &Square, first: usize) -> Option<Square> {
     let n = BLOCKS - first;
     let matrix = DMatrix::from_fn(n, n, |i, j| square[first + i][first + j]);
-    let inverse = matrix.cholesky()?.inverse();
+    Some(lower_right(&matrix.cholesky()?.inverse(), first))
+}
+
+/// A square that is zero but for its lower right part, which begins with `first`.
+fn lower_right(part: &DMatrix<f64>, first: usize) -> Square {
     let at = |i: usize, j: usize| match (i.checked_sub(first), j.checked_sub(first)) {
-        (Some(i), Some(j)) => inverse[(i, j)],
+        (Some(i), Some(j)) => part[(i, j)],
         _ => 0.0,
     };
-    Some(std::array::from_fn(|i| std::array::from_fn(|j| at(i, j))))
+    std::array::from_fn(|i| std::array::from_fn(|j| at(i, j)))
+}
+
+/// Inverse of the Cholesky factor of the lower right part of a positive definite square.
+fn whitening(square: &Square, first: usize) -> Option<Square> {
+    let n = BLOCKS - first;
+    let matrix = DMatrix::from_fn(n, n, |i, j| square[first + i][first + j]);
+    let factor = matrix.cholesky()?.l();
+    let inverse = factor.solve_lower_triangular(&DMatrix::identity(n, n))?;
+    Some(lower_right(&inverse, first))
 }
 
 /// What a window `z`, whose precision matrix is `P`, says of a change `s`: the square of `z - x s`
@@ -103,6 +118,10 @@ pub struct Law {
     directions: Vec<Direction>,
     #[checkpoint(fixed)]
     precision: Vec<Square>,
+    /// What makes the values along each direction independent, the oldest first: its square is the
+    /// precision.
+    #[checkpoint(fixed)]
+    whitening: Vec<Square>,
     /// Inverse of the covariance of one block, by rows.
     #[checkpoint(fixed)]
     spatial: Vec<f64>,
@@ -116,6 +135,8 @@ pub struct Law {
     /// One where a reading is there, else zero.
     read: [Row; CHANNELS_MAX],
     gradient: [Row; CHANNELS_MAX],
+    /// Part of each block in the square, given the blocks before it.
+    parts: Row,
     square: f64,
 }
 
@@ -132,9 +153,11 @@ impl Law {
         if !directions.iter().all(whole) {
             return None;
         }
-        let precision = directions.iter().map(|d| inverse(&d.covariance(), first));
-        let precision: Option<Vec<Square>> = precision.collect();
-        let precision = precision?;
+        let of_each = |of: fn(&Square, usize) -> Option<Square>| {
+            let found = directions.iter().map(|d| of(&d.covariance(), first));
+            found.collect::<Option<Vec<Square>>>()
+        };
+        let (precision, whitening) = (of_each(inverse)?, of_each(whitening)?);
         let mut spatial = vec![0.0; channels * channels];
         let mut own = vec![[[0.0; BLOCKS]; BLOCKS]; channels];
         for (direction, precision) in directions.iter().zip(&precision) {
@@ -162,12 +185,14 @@ impl Law {
             first,
             directions: directions.to_vec(),
             precision,
+            whitening,
             spatial,
             own,
             own_inverse,
             z: [[0.0; BLOCKS]; CHANNELS_MAX],
             read: [[0.0; BLOCKS]; CHANNELS_MAX],
             gradient: [[0.0; BLOCKS]; CHANNELS_MAX],
+            parts: [0.0; BLOCKS],
             square: 0.0,
         })
     }
@@ -202,17 +227,20 @@ impl Law {
             }
         }
         self.gradient = [[0.0; BLOCKS]; CHANNELS_MAX];
-        self.square = 0.0;
-        for (direction, precision) in self.directions.iter().zip(&self.precision) {
+        self.parts = [0.0; BLOCKS];
+        let laws = self.precision.iter().zip(&self.whitening);
+        for (direction, (precision, whitening)) in self.directions.iter().zip(laws) {
             let along = along(&direction.vector, &self.z);
             let weighed = product(precision, &along);
-            self.square += dot(&along, &weighed);
+            let parts = self.parts.iter_mut().zip(product(whitening, &along));
+            parts.for_each(|(part, value)| *part += value * value);
             for (share, row) in direction.vector.iter().zip(&mut self.gradient) {
                 row.iter_mut()
                     .zip(weighed)
                     .for_each(|(a, b)| *a += share * b);
             }
         }
+        self.square = self.parts.iter().sum();
         // What was not measured speaks for nothing.
         for (row, read) in self.gradient.iter_mut().zip(&self.read) {
             *row = masked(row, read);
@@ -224,7 +252,7 @@ impl Law {
         self.z = [[0.0; BLOCKS]; CHANNELS_MAX];
         self.read = [[0.0; BLOCKS]; CHANNELS_MAX];
         self.gradient = [[0.0; BLOCKS]; CHANNELS_MAX];
-        self.square = 0.0;
+        (self.parts, self.square) = ([0.0; BLOCKS], 0.0);
     }
 
     /// The residuals of a channel, completed.
@@ -396,15 +424,35 @@ impl Law {
         (left - FREEDOM).max(0.0)
     }
 
-    /// Natural logarithm of how much more likely a window with this square is if something is wrong
-    /// that no single fault explains: all deviations are larger by one of a few factors.
+    /// Part of each block in the square, given the blocks before it.
     #[must_use]
-    pub fn log_ratio_unknown(&self, square: f64) -> f64 {
-        let larger = UNKNOWN.map(|factor| self.log_ratio_larger(square, factor));
-        log_sum_exp(&larger) - (UNKNOWN.len() as f64).ln()
+    pub const fn parts(&self) -> &Row {
+        &self.parts
     }
 
-    /// The same if all deviations are larger by this factor.
+    /// Natural logarithm of how much more likely a window with this square is if something is wrong
+    /// that no single fault explains: from some block on all deviations are larger by one of a few
+    /// factors. `parts`: of the blocks in the square, as far as they are known; from the first that
+    /// is not, no onset is tried.
+    #[must_use]
+    pub fn log_ratio_unknown(&self, square: f64, parts: &[f64]) -> f64 {
+        let tried = UNKNOWN_ONSETS.map(|first| {
+            let Some(before) = parts.get(..first) else {
+                return f64::NEG_INFINITY;
+            };
+            let later = square - before.iter().sum::<f64>();
+            let larger = UNKNOWN.map(|factor| {
+                let less = later * (1.0 - 1.0 / (factor * factor));
+                let values = (self.channels * self.blocks(first)) as f64;
+                self.log_ratio_at(square, less) - values * factor.ln()
+            });
+            log_sum_exp(&larger) - (UNKNOWN.len() as f64).ln()
+        });
+        log_sum_exp(&tried) - (UNKNOWN_ONSETS.len() as f64).ln()
+    }
+
+    /// Natural logarithm of how much more likely a window with this square is if all its deviations
+    /// are larger by this factor.
     #[must_use]
     pub fn log_ratio_larger(&self, square: f64, factor: f64) -> f64 {
         let less = square * (1.0 - 1.0 / (factor * factor));

@@ -7,7 +7,7 @@ use super::channel::Channel;
 use super::context_change::ContextChanges;
 use super::coverage::{Combinations, Range, widening};
 use super::fault_kind::FaultKind;
-use super::identity::{Identity, without_groups};
+use super::identity::{ChannelIdentity, Identity, without_groups};
 use super::law::{Direction, Law};
 use super::model_check::{check_channel, check_scatter};
 use super::observation::History;
@@ -25,7 +25,7 @@ use crate::learned::{Calibration, Form};
 use crate::model_file::{self, ModelFile, check_range, refuse};
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 5;
+pub const VERSION: u32 = 6;
 /// The word by which the file is told from a model of the rover's kind.
 pub const KIND: &str = "channels";
 /// Prior fault rate at which log-odds are collected and tempered, 1/h.
@@ -58,6 +58,8 @@ pub enum Class {
     /// A declared fault, by the turns of its wheel. Its law has no tail: the variances are measured
     /// in the same turns, and few turns of a log are independent.
     Turning,
+    /// Two faults at once, of which one is that of a sensor that reads anything.
+    Pair,
     /// What no single fault explains.
     Unknown,
 }
@@ -66,7 +68,7 @@ impl Class {
     /// What declared faults show.
     pub const DECLARED: [Self; 3] = [Self::Shift, Self::Signature, Self::Turning];
     /// Every class.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Steady,
         Self::Still,
         Self::Late,
@@ -76,6 +78,7 @@ impl Class {
         Self::Shift,
         Self::Signature,
         Self::Turning,
+        Self::Pair,
         Self::Unknown,
     ];
 
@@ -224,11 +227,15 @@ impl Model {
     /// # Errors
     /// [`ModelError::Robot`].
     pub fn check_robot(&self, robot: &Description) -> Result<(), ModelError> {
-        let channels = self.channel.iter();
+        let channels = self.channel.iter().map(|one| ChannelIdentity {
+            name: one.name.clone(),
+            period: one.period,
+            drifts: one.drifts,
+        });
         let of_model = Identity {
             name: self.robot.clone(),
             axes: self.command.iter().map(|axis| axis.name.clone()).collect(),
-            channels: channels.map(|one| (one.name.clone(), one.period)).collect(),
+            channels: channels.collect(),
             interval_s: self.interval_s,
             warm_up_s: self.warm_up_s,
             faults: without_groups(&self.declared),

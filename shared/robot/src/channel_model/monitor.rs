@@ -18,7 +18,7 @@ use super::component::{Places, Target, components, drives, targets};
 use super::context_change::ChangeWatch;
 use super::coverage::{Combinations, Range, widening};
 use super::declared_faults::{DeclaredFaults, Taught};
-use super::directions::{covariances, directions};
+use super::directions::{covariances, directions, parted};
 use super::law::{BLOCK_S, BLOCKS, Law};
 use super::model::{Class, FAULT_RATE_1_H, Model, Tail};
 use super::observation::History;
@@ -113,7 +113,7 @@ impl Monitor {
                 wheel: drive.wheel,
             });
         let driven = driven.collect();
-        let laws = laws(model, &places)?;
+        let laws = laws(model, &places, &sensed)?;
         let targets: Vec<Target> = sensed.iter().map(|one| one.target.clone()).collect();
         let taught = (places.len() == all.len()).then_some(Taught {
             signatures: &model.signatures,
@@ -273,6 +273,13 @@ impl Monitor {
             for (slot, raw) in all.iter_mut().zip(&raw[..n]) {
                 *slot = raw[class];
             }
+            if class == Class::Pair as usize {
+                // Where no second fault is looked for, it is that of the sensor alone.
+                let alone = self.classes[Class::Erratic as usize];
+                let pair = self.bank.pair();
+                self.classes[class] = pair.map_or(alone, |pair| prior + pair.log_ratio);
+                continue;
+            }
             if class == Class::Unknown as usize {
                 self.classes[class] = unknown.max(IMPOSSIBLE);
                 odds_unknown = tempered(tail.as_ref(), unknown);
@@ -313,8 +320,17 @@ impl Monitor {
                 .fold(IMPOSSIBLE, |most, (_, log_odds)| log_odds.max(most))
         };
         let single = &raw[..self.watched.len() - self.bank.declared().len()];
-        let single = single.iter().map(of_means).fold(IMPOSSIBLE, f64::max);
-        let pair = self.explain(prior, single, (&mut odds[..n], &mut odds_unknown));
+        let single = single.iter().map(of_means).zip(&self.watched);
+        let single = single.max_by(|(one, _), (other, _)| one.total_cmp(other));
+        let explained = single.map_or([0.0; 2], |(log_odds, watched)| {
+            let log_ratio = log_odds - prior;
+            let at_best = match watched.part {
+                Part::Drive => self.bank.at_best(log_ratio),
+                _ => log_ratio,
+            };
+            [log_ratio, at_best]
+        });
+        let pair = self.explain(prior, explained, (&mut odds[..n], &mut odds_unknown));
         for (slot, value) in odds.iter_mut().zip(odds_of_noise) {
             *slot = log_add(*slot, value);
         }
@@ -323,29 +339,27 @@ impl Monitor {
 
     /// Divides what the window's means show among declared faults, other single ones, two at once,
     /// and what none of them explains. What a name leaves has to be as in health, or less than what
-    /// it explains. `single`: log-odds, with this prior, of the likeliest fault that is not
-    /// declared. Returns the components of the two faults.
+    /// it explains. `explained`: how much more likely the likeliest fault that is not declared makes
+    /// the window, and how much that may be at best. Returns the components of the two faults.
     fn explain(
-        &mut self,
+        &self,
         prior: f64,
-        single: f64,
+        explained: [f64; 2],
         (odds, unknown): (&mut [f64], &mut f64),
     ) -> Option<[usize; 2]> {
-        let pair = self.bank.weigh_pair();
+        let pair = self.bank.pair();
+        let [mut explained, at_best] = explained;
         let tail = |class: Class| self.tails[class as usize].as_ref();
         let first = odds.len() - 1 - self.bank.declared().len();
         let (single_odds, declared_odds) = odds.split_at_mut(first);
         let (named, declared) = (log_sum_exp(single_odds), log_sum_exp(declared_odds));
         let mut total = log_add(log_add(named, declared), *unknown);
-        let mut explained = single - prior;
         let mut both = None;
         if let Some(pair) = pair {
-            // No log shows how often two are seen where there is none: they have the tail of
-            // sensors that read anything.
-            let log_odds = tempered(tail(Class::Erratic), prior + pair.log_ratio);
+            let log_odds = tempered(tail(Class::Pair), self.classes[Class::Pair as usize]);
             total = log_add(total, log_odds - ANOTHER);
             let slope = tail(Class::Unknown).map_or(1.0, |tail| tail.slope);
-            let more = slope * (pair.log_ratio - explained) - ANOTHER;
+            let more = slope * (pair.log_ratio - at_best) - ANOTHER;
             if more > 0.0 {
                 explained = pair.log_ratio;
                 both = Some((pair.components, more));
@@ -369,8 +383,10 @@ impl Monitor {
         let declared_pair = self.pair_components().map(|(components, _)| components);
         match (both, declared_odds.last_mut()) {
             (Some((components, more)), Some(slot)) => {
-                *slot = log_add(*slot, of_named - log_add(0.0, -more));
-                Some(components)
+                let odds = of_named - log_add(0.0, -more);
+                let is_likelier = declared_pair.is_none() || odds > *slot;
+                *slot = log_add(*slot, odds);
+                Some(components).filter(|_| is_likelier).or(declared_pair)
             }
             _ => declared_pair,
         }
@@ -424,7 +440,8 @@ impl Monitor {
         let anything = shared || unknown > SUSPECT_LOG_ODDS;
         self.suspects = channels_of.fold(Suspects::default(), |held, (channel, component)| {
             // A charge falls on while something else is wrong.
-            let own = u64::from(is_suspect(component)) << channel;
+            let is_of_pair = pair.is_some_and(|two| two.contains(&component)) && is_suspect(n);
+            let own = u64::from(is_suspect(component) || is_of_pair) << channel;
             Suspects {
                 context: held.context | own | u64::from(anything) << channel,
                 level: held.level | own,
@@ -469,12 +486,19 @@ fn sensed(robot: &Description, used: &[(usize, Channel)]) -> Option<Vec<ChannelP
     used.iter().map(one).collect()
 }
 
-/// The laws of the channels at these places; none if the model holds no laws.
-fn laws(model: &Model, places: &[usize]) -> Option<Laws> {
-    let found = directions(&covariances(&model.direction, places));
-    let mean = (0..=BLOCKS - BLOCKS_MIN).map(|first| Law::new(&found, places.len(), first));
+/// The laws of these channels, which have these places; none if the model holds no laws.
+fn laws(model: &Model, places: &[usize], sensed: &[ChannelPlace]) -> Option<Laws> {
+    let by_lag = covariances(&model.direction, places);
+    let (found, n) = (directions(&by_lag), places.len());
+    let mean = (0..=BLOCKS - BLOCKS_MIN).map(|first| Law::new(&found, n, first));
+    let last = sensed.iter().map(|sensed| sensed.component).max()?;
+    let without = (0..=last).map(|component| {
+        let is_apart = |i: usize| sensed[i].component == component;
+        Law::new(&directions(&parted(&by_lag, is_apart)), n, 0)
+    });
     Some(Laws {
         mean: mean.collect::<Option<_>>()?,
+        without: without.collect::<Option<_>>()?,
         scatter: ScatterLaw::new(&model.scatter, places),
     })
 }

@@ -220,24 +220,27 @@ impl Window {
         let mut moment = NOTHING;
         moment.is_there = true;
         moment.moves = now.moving && now.moving_s >= MOVES_S;
+        let mut of_commands = [0.0; CHANNELS_MAX];
         for (i, (place, channel)) in self.channels.iter().enumerate() {
-            let mut predicted = channel.predict(commands, &self.scales);
-            if channel.drifts {
-                let apart = now.values[*place].map(|value| value - predicted);
-                let level = &mut self.level[i];
-                predicted += match held.level >> i & 1 {
-                    0 => level.take(apart, now.dt_s),
-                    _ => level.value(),
-                };
-            }
+            of_commands[i] = channel.predict(commands, &self.scales);
+            let apart = now.values[*place].map(|value| value - of_commands[i]);
+            let apart = apart.filter(|_| channel.drifts);
+            let predicted = of_commands[i] + self.level[i].advance(apart, now.dt_s);
             let before = if was_there { last[i] } else { predicted };
             let basis = Channel::basis(&now.command, &self.scales, predicted, before);
-            let unit = 1.0 / (widening * channel.variance_at(basis).sqrt());
+            let variance = match channel.drifts {
+                true => channel.variance_at(basis) * self.level[i].variance(),
+                false => channel.variance_at(basis),
+            };
+            let unit = 1.0 / (widening * variance.sqrt());
             // A single reading may be a glitch; what the one before confirms is none.
             let last = moment_before.z[i].unwrap_or(0.0) * unit / moment_before.unit[i].max(1e-300);
             let (low, high) = (last.min(0.0) - CLIP, last.max(0.0) + CLIP);
             let z = now.values[*place].map(|value| ((value - predicted) * unit).clamp(low, high));
             (moment.predicted[i], moment.unit[i], moment.z[i]) = (predicted, unit, z);
+            if let Some(apart) = apart.filter(|_| held.level >> i & 1 == 0) {
+                self.level[i].take(apart, CLIP / unit, now.dt_s);
+            }
         }
         for d in 0..self.drives() {
             let (drive, speed) = (&self.scales.drives[d], self.scales.speeds[d]);
@@ -246,7 +249,7 @@ impl Window {
                 std::array::from_fn(|axis| command[axis] + OFFSET * speed * drive.effect[axis])
             });
             for (i, (_, channel)) in self.channels.iter().enumerate() {
-                let with = moment.predicted[i];
+                let with = of_commands[i];
                 let without = channel.predict(&without, &self.scales);
                 let more = channel.predict(&more, &self.scales);
                 moment.share[d][i] = (with - without) * moment.unit[i];

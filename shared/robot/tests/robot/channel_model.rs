@@ -65,10 +65,10 @@ fn a_file_that_was_changed_by_accident_is_refused() {
     );
     let edited = Model::from_toml(&edited("exposure_s = 46", "exposure_s = 946")).unwrap();
     assert!(edited.is_edited() && edited.hash() != model.hash());
-    let old = shipped().replacen("version = 5", "version = 4", 1);
+    let old = shipped().replacen("version = 6", "version = 5", 1);
     let message = Model::from_toml(&old).unwrap_err().to_string();
     assert!(
-        message.contains("layout version 4; this program reads version 5"),
+        message.contains("layout version 5; this program reads version 6"),
         "{message}"
     );
     let cut = &shipped()[..shipped().len() / 2];
@@ -223,6 +223,16 @@ fn the_law_says_what_its_whole_covariance_says() {
         let (z, s) = (draw(), draw());
         law.take(&rows(&z).iter().map(|row| row.map(Some)).collect::<Vec<_>>());
         near(law.square(), z.dot(&(&precision * &z)));
+        // The first blocks alone have the square of their own law.
+        for first in 0..=BLOCKS {
+            let there: Vec<usize> = (0..3 * BLOCKS).filter(|i| i % BLOCKS < first).collect();
+            let of_there = DMatrix::from_fn(there.len(), there.len(), |i, j| {
+                covariance[(there[i], there[j])]
+            });
+            let z_there = DVector::from_fn(there.len(), |i, _| z[there[i]]);
+            let square = z_there.dot(&(of_there.cholesky().unwrap().inverse() * &z_there));
+            near(law.parts()[..first].iter().sum(), square);
+        }
         let Change { b, a } = law.joint_change(&rows(&s), None);
         near(b, s.dot(&(&precision * &z)));
         near(a, s.dot(&(&precision * &s)));
@@ -327,7 +337,25 @@ fn what_no_fault_explains_is_weighed_by_the_density_of_wider_laws() {
             assert!((law.log_ratio_larger(square, factor) - ratio).abs() < 1e-9);
             mean += ratio.exp() / 5.0;
         }
-        assert!((law.log_ratio_unknown(square) - mean.ln()).abs() < 1e-9);
+        // Where nothing is known of its blocks: only from the start.
+        let throughout = law.log_ratio_unknown(square, &[]);
+        assert!((throughout - (mean / 4.0).ln()).abs() < 1e-9);
+        // From each of the onsets on, of which the last blocks hold all but one a block.
+        let before = [1.0; 7];
+        let mut all = 0.0;
+        for first in [0, 4, 6, 7] {
+            let later = 3.0 * (BLOCKS - first) as f64;
+            for factor in [2.0, 4.0, 8.0, 16.0, 32.0] {
+                let rest = square - first as f64;
+                let scaled = first as f64 + rest / (factor * factor);
+                let densities = [scaled, square].map(|square| log_density(square, 1.0));
+                let ratio = densities[0] - densities[1] - later * f64::ln(factor);
+                all += ratio.exp() / 20.0;
+            }
+        }
+        if square >= n {
+            assert!((law.log_ratio_unknown(square, &before) - all.ln()).abs() < 1e-9);
+        }
     }
 }
 

@@ -68,7 +68,10 @@ fn residuals(
             let mut predicted = model.predict(&commands(history), scales);
             if model.drifts {
                 let apart = now.values[place].map(|value| value - predicted);
-                predicted += level.take(apart, now.dt_s);
+                predicted += level.advance(apart, now.dt_s);
+                if let Some(apart) = apart {
+                    level.take(apart, f64::INFINITY, now.dt_s);
+                }
             }
             let last = before
                 .filter(|_| history.ago(1).is_some())

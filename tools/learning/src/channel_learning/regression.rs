@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 use vigil_robot::channel_model::channel::commands;
+use vigil_robot::channel_model::level::{Followed, Trend};
+use vigil_robot::channel_model::observation::History;
 use vigil_robot::channel_model::{Channel, Regressor, Scales, Term};
 
 use super::LogError;
@@ -31,6 +33,7 @@ pub(super) fn fit(
 ) -> Result<(), LogError> {
     let (mut rows, mut values) = (Vec::new(), Vec::new());
     for record in records {
+        let mut trends = Trends::default();
         for (history, fold) in record.histories.iter().zip(&record.folds) {
             let value = history.ago(0).and_then(|now| now.values[place]);
             let Some(value) =
@@ -39,13 +42,15 @@ pub(super) fn fit(
                 continue;
             };
             let commands = commands(history);
-            rows.extend(
-                channel
-                    .terms
-                    .iter()
-                    .map(|term| term.value(&commands, scales)),
-            );
-            values.push(value);
+            let terms = channel.terms.iter();
+            let row: Vec<f64> = terms.map(|term| term.value(&commands, scales)).collect();
+            if !channel.drifts {
+                rows.extend(row);
+                values.push(value);
+            } else if let Some((row, value)) = trends.apart(channel, row, value, history) {
+                rows.extend(row);
+                values.push(value);
+            }
         }
     }
     let terms = channel.terms.len();
@@ -61,6 +66,47 @@ pub(super) fn fit(
         channel.weights = weights;
     }
     Ok(())
+}
+
+/// What the level of a drifting channel follows: it is linear in the channel's value and in what
+/// predicts it, so that the trend of each is left out of it.
+#[derive(Debug, Default)]
+struct Trends {
+    followed: Followed,
+    of_row: Vec<Trend>,
+    of_value: Trend,
+}
+
+impl Trends {
+    /// How far a row and its value lie from the trends before them; none of the first.
+    fn apart(
+        &mut self,
+        channel: &Channel,
+        mut row: Vec<f64>,
+        value: f64,
+        history: &History,
+    ) -> Option<(Vec<f64>, f64)> {
+        let dt_s = history.ago(0)?.dt_s;
+        let gains = self.followed.gains(dt_s);
+        let follow = |trend: &mut Trend, value: f64| {
+            trend.advance(dt_s);
+            let apart = value - trend.value;
+            trend.correct(apart, gains);
+            apart
+        };
+        let is_first = self.of_row.is_empty();
+        self.of_row.resize(row.len(), Trend::default());
+        let apart = follow(&mut self.of_value, value);
+        let all = row.iter_mut().zip(&mut self.of_row).zip(&channel.terms);
+        for ((x, trend), term) in all {
+            let apart = follow(trend, *x);
+            // The level takes any constant; one of zero is as good as another.
+            if is_penalised(term) {
+                *x = apart;
+            }
+        }
+        (!is_first).then_some((row, apart))
+    }
 }
 
 /// A channel's constant may be of any size.

@@ -8,7 +8,7 @@ use vigil_robot::learned::channels::Channels;
 
 use super::channel_sensing::{alarm, learned, robot, run, stop_and_go};
 
-const ONSET_S: f64 = 10.0;
+pub const ONSET_S: f64 = 10.0;
 
 /// A run of a robot some of whose frames are spoilt since the onset.
 fn spoilt(id: u32, spoil: impl Fn(&mut SensorFrame)) -> Run {
@@ -23,7 +23,12 @@ fn spoilt(id: u32, spoil: impl Fn(&mut SensorFrame)) -> Run {
 
 /// Shares of the time since two seconds after the onset in which the log-odds are above zero and
 /// more than half of them speak for each component alone, then for these two at once.
-fn shares(model: &Model, robot: &Description, run: &Run, pair: [&str; 2]) -> Vec<(String, f64)> {
+pub fn shares(
+    model: &Model,
+    robot: &Description,
+    run: &Run,
+    pair: [&str; 2],
+) -> Vec<(String, f64)> {
     let names: Vec<String> = components(robot).into_iter().map(|one| one.name).collect();
     let mut counts = vec![0.0; names.len() + 1];
     let mut monitor = Monitor::new(model, robot, Channels::PoseEncoders, 1.0).unwrap();
@@ -58,7 +63,7 @@ fn shares(model: &Model, robot: &Description, run: &Run, pair: [&str; 2]) -> Vec
         .collect()
 }
 
-fn share(shares: &[(String, f64)], name: &str) -> f64 {
+pub fn share(shares: &[(String, f64)], name: &str) -> f64 {
     shares.iter().find(|(one, _)| one == name).unwrap().1
 }
 

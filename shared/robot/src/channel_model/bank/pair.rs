@@ -1,9 +1,10 @@
 //! Two faults at once: a sensor whose readings say nothing, and what all others say then.
 
-use vigil_inference::logspace::log_sum_exp;
+use vigil_checkpoint::CheckpointValue;
+use vigil_inference::logspace::{log_add, log_sum_exp};
 
-use super::{Bank, IMPOSSIBLE, KINDS_MAX};
-use crate::channel_model::fault_kind::{FaultKind, SENSOR_KINDS};
+use super::{Bank, ERRATIC, IMPOSSIBLE, KINDS_MAX, Weighed};
+use crate::channel_model::fault_kind::{DRIVE_KINDS, FaultKind, SENSOR_KINDS};
 use crate::channel_model::law::BLOCKS;
 use crate::channel_model::{CHANNELS_MAX, COMPONENTS_MAX};
 
@@ -11,8 +12,12 @@ use crate::channel_model::{CHANNELS_MAX, COMPONENTS_MAX};
 /// for. Chosen: what a window of health seldom has.
 const UNEXPLAINED: f64 = 3.0;
 
+/// Place of [`FaultKind::Erratic`] among the kinds of a sensor.
+const ERRATIC_PLACE: usize = SENSOR_KINDS.len() - 1;
+const _: () = assert!(matches!(SENSOR_KINDS[ERRATIC_PLACE], FaultKind::Erratic));
+
 /// Two faults at once of which one is a sensor's.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct SensorPair {
     /// Their components: the sensor, then the other.
     pub components: [usize; 2],
@@ -23,22 +28,28 @@ pub struct SensorPair {
 impl Bank {
     /// The likeliest two faults of which one is the sensor whose silence explains most; none if the
     /// window is explained without a second one.
+    #[must_use]
+    pub const fn pair(&self) -> Option<SensorPair> {
+        self.pair
+    }
+
+    /// Looks for a second fault beside the sensor whose silence explains most, and adds what is
+    /// said of that one if all its channels say nothing.
     ///
-    /// With the readings of sensor A left out, the law of all others is a marginal one, but for
-    /// what other blocks tell of A's. So the likelihood of A and B is that of A saying nothing,
-    /// times that of B without A's channels.
-    pub fn weigh_pair(&mut self) -> Option<SensorPair> {
-        let values = self.law().values() as f64;
-        if self.law().square() <= UNEXPLAINED * values {
-            return None;
+    /// The likelihood of A and B is that of A saying nothing, times that of B under the law of all
+    /// channels but A's.
+    pub(super) fn weigh_pair(&mut self) {
+        self.pair = None;
+        let (whole, values) = (self.law().square(), self.law().values() as f64);
+        if self.first > 0 || whole <= UNEXPLAINED * values {
+            return;
         }
-        let erratic = SENSOR_KINDS
-            .iter()
-            .position(|kind| *kind == FaultKind::Erratic)?;
-        let silence = |bank: &Self, component: usize| bank.weighed[component][erratic].log_ratio;
+        let silence =
+            |bank: &Self, component: usize| bank.weighed[component][ERRATIC_PLACE].log_ratio;
         let first = self
             .components()
-            .max_by(|&a, &b| silence(self, a).total_cmp(&silence(self, b)))?;
+            .max_by(|&a, &b| silence(self, a).total_cmp(&silence(self, b)));
+        let Some(first) = first else { return };
         let n = self.channels.len();
         let is_first: [bool; CHANNELS_MAX] =
             std::array::from_fn(|i| i < n && self.channels[i].component == first);
@@ -49,38 +60,72 @@ impl Bank {
                 *row = [None; BLOCKS];
             }
         });
-        let of_first = silence(self, first);
-        let whole = self.weighed;
-        let index = self.first.min(self.laws.mean.len() - 1);
-        self.laws.mean[index].take(&others[..n]);
-        let second = (self.law().square() > UNEXPLAINED * values)
+        let Some(law) = self.laws.without.get_mut(first) else {
+            return;
+        };
+        law.take(&others[..n]);
+        self.left_out = Some(first);
+        self.silence_all(first, whole);
+        let of_first = silence(self, first) - (KINDS_MAX as f64).ln();
+        let weighed = self.weighed;
+        let blocks = is_first.iter().filter(|is_first| **is_first).count() * BLOCKS;
+        let second = (self.law().square() > UNEXPLAINED * (values - blocks as f64))
             .then(|| self.second(&is_first))
             .flatten();
-        self.laws.mean[index].take(&self.window.z[..n]);
-        self.weighed = whole;
-        second.map(|(second, log_ratio)| SensorPair {
+        (self.weighed, self.left_out) = (weighed, None);
+        self.pair = second.map(|(second, log_ratio)| SensorPair {
             components: [first, second],
             log_ratio: of_first + log_ratio,
-        })
+        });
+    }
+
+    /// Adds what is said of a component if all its channels say nothing; without them the law is
+    /// taken, with them the window had the square `whole`.
+    fn silence_all(&mut self, component: usize, whole: f64) {
+        let shares = self.components().filter(|&other| other == component);
+        let shares = shares.count() as f64;
+        if shares < 2.0 {
+            return;
+        }
+        let law = self.law();
+        let less = (whole - law.square()).max(0.0) * (1.0 - 1.0 / (ERRATIC * ERRATIC));
+        let penalty = shares * law.blocks(0) as f64 * ERRATIC.ln() + shares.ln();
+        let log_ratio = law.log_ratio_at(whole, less) - penalty;
+        let age_s = self.window.block_s() * law.blocks(0) as f64;
+        let slot = &mut self.weighed[component][ERRATIC_PLACE];
+        let sum = log_sum_exp(&[slot.log_ratio, log_ratio]);
+        if log_ratio > slot.log_ratio {
+            *slot = Weighed {
+                age_s,
+                ..Weighed::NONE
+            };
+        }
+        slot.log_ratio = sum;
     }
 
     /// The likeliest fault of the channels that are not left out.
     fn second(&mut self, left_out: &[bool; CHANNELS_MAX]) -> Option<(usize, f64)> {
-        self.weighed = [[super::Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
+        self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
         for channel in (0..self.channels.len()).filter(|&channel| !left_out[channel]) {
             self.weigh_sensor(channel);
         }
         for drive in 0..self.drives.len() {
             self.weigh_drive(drive);
         }
-        let total = |component: usize| {
-            let kinds = self.weighed[component].map(|one| one.log_ratio);
-            log_sum_exp(&kinds) - (KINDS_MAX as f64).ln()
+        // Noise and silence are no matter of the means, and the first sensor's are among them.
+        let total = |component: usize, kinds: &[FaultKind]| {
+            let places = self.weighed[component].iter().zip(kinds);
+            let of_means = places.map(|(one, kind)| match kind {
+                FaultKind::Noise | FaultKind::Rough | FaultKind::Missing => IMPOSSIBLE,
+                _ => one.log_ratio,
+            });
+            of_means.fold(IMPOSSIBLE, log_add) - (KINDS_MAX as f64).ln()
         };
-        let others = self
-            .components()
-            .chain(self.drives.iter().map(|one| one.component));
-        let rated = others.map(|component| (component, total(component)));
+        let sensors = self.components();
+        let sensors = sensors.map(|component| (component, total(component, &SENSOR_KINDS)));
+        let drives = self.drives.iter().map(|one| one.component);
+        let drives = drives.map(|component| (component, total(component, &DRIVE_KINDS)));
+        let rated = sensors.chain(drives);
         let best = rated.max_by(|a, b| a.1.total_cmp(&b.1))?;
         (best.1 > IMPOSSIBLE).then_some(best)
     }

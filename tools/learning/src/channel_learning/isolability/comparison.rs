@@ -17,6 +17,8 @@ pub(super) struct Products {
     pub signatures: Vec<Signature>,
     first: usize,
     square: f64,
+    /// Parts in it of the blocks before the first.
+    before: Vec<f64>,
     /// `s_f' P s_g`, by rows.
     table: Vec<Vec<f64>>,
 }
@@ -43,6 +45,7 @@ impl Products {
             signatures,
             first,
             square: snapshot.square,
+            before: snapshot.parts[..first].to_vec(),
             table,
         }
     }
@@ -88,7 +91,7 @@ impl Products {
     /// True if a window with a fault is expected to alarm, for whatever reason.
     fn alarms(&self, faults: &[Fault], fault: usize, rule: &Rule) -> bool {
         let square = self.sights(faults, [fault, fault], rule, |_| 0.0)[0].square;
-        let mut classes = rule.classes(square);
+        let mut classes = rule.classes(square, &self.before);
         let mut add = |class: Class, log_odds: f64| {
             let slot = &mut classes[class as usize];
             *slot = log_add(*slot, log_odds);

@@ -26,10 +26,12 @@ pub(super) struct Rule {
 }
 
 impl Rule {
-    /// Log-odds of no single fault in a window with this square, by class.
-    pub fn classes(&self, square: f64) -> [f64; Class::ALL.len()] {
+    /// Log-odds of no single fault in a window with this square, by class; `before`: the parts of
+    /// the blocks in it before the fault.
+    pub fn classes(&self, square: f64, before: &[f64]) -> [f64; Class::ALL.len()] {
         let mut classes = [IMPOSSIBLE; Class::ALL.len()];
-        classes[Class::Unknown as usize] = self.prior + self.law.log_ratio_unknown(square);
+        let unknown = self.law.log_ratio_unknown(square, before);
+        classes[Class::Unknown as usize] = self.prior + unknown;
         classes
     }
 

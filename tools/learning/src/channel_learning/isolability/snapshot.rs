@@ -34,6 +34,8 @@ pub(super) struct Snapshot {
     pub place: Place,
     /// Square of its residuals under the law.
     pub square: f64,
+    /// Part of each block in it, given those before.
+    pub parts: Row,
     /// Whitened residuals, by channel.
     pub z: Vec<Row>,
     /// One over the residual's deviation.
@@ -68,6 +70,7 @@ impl Snapshot {
         Self {
             place: Place::default(),
             square: law.square(),
+            parts: *law.parts(),
             z: (0..n).map(|i| *law.row(i)).collect(),
             unit: window.unit[..n].to_vec(),
             predicted: window.predicted[..n].to_vec(),

@@ -60,6 +60,7 @@ fn snapshot(channels: usize, predicted: Row) -> Snapshot {
     Snapshot {
         place: Place::default(),
         square: 8.0,
+        parts: [1.0; BLOCKS],
         z: vec![[0.0; BLOCKS]; channels],
         unit: vec![[1.0; BLOCKS]; channels],
         predicted: vec![predicted; channels],
