@@ -4,7 +4,7 @@
 
 use std::path::PathBuf;
 
-use vigil_blocks::EventKind;
+use vigil_blocks::{Entry, EventKind};
 use vigil_cycle::allocation::{CountingAllocator, allocations};
 use vigil_cycle::placement::{PlacementRequest, read_back};
 use vigil_cycle::port::Bus;
@@ -14,10 +14,16 @@ use vigil_cycle::{
     Topic, VirtualClock,
 };
 use vigil_detector::DetectorStage;
+use vigil_diagnosis::identify::Input;
 use vigil_identifier::IdentifierStage;
 use vigil_sensor_sim::{SensorSource, SimulatorSource};
 use vigil_setup::{GraphArgs, Setup};
 use vigil_supervisor::SupervisorStage;
+
+#[path = "virtual_graph/kobuki.rs"]
+mod kobuki;
+
+use kobuki::Kobuki;
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
@@ -28,14 +34,20 @@ const CYCLES: u64 = 1200;
 /// A sensor frame is held back in this cycle: the deadlines pass.
 const SILENT: u64 = 900;
 
-/// The default graph, by its solved policy or by a heuristic.
-fn setup(is_solved: bool) -> Setup {
-    let config = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../config/rover.toml");
+fn load(config: &str) -> Setup {
+    let config = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("../config")
+        .join(config);
     let args = GraphArgs {
         config,
         ..GraphArgs::default()
     };
-    let mut setup = args.load().unwrap();
+    args.load().unwrap()
+}
+
+/// The default graph, by its solved policy or by a heuristic.
+fn setup(is_solved: bool) -> Setup {
+    let mut setup = load("rover.toml");
     if !is_solved {
         setup.policy = None;
         setup.file.supervisor.policy = "qmdp".to_owned();
@@ -84,6 +96,44 @@ fn steady_cycles_of_every_service_allocate_nothing() {
 #[test]
 fn nor_do_they_with_a_policy_that_was_solved_beforehand() {
     demand_steady(&setup(true));
+}
+
+#[test]
+fn nor_do_those_of_a_robot_that_was_learned_from_its_log() {
+    let setup = load("kobuki.toml");
+    let mut detector = vigil_detector::assemble(&setup).unwrap();
+    let mut identifier = vigil_identifier::assemble(&setup).unwrap();
+    let (mut detection, mut diagnosis) = (Box::default(), Box::default());
+    let (mut particles, mut further) = (Box::default(), Box::default());
+    let kobuki = Kobuki::new(&setup.robot, &["stuck:L@6"], 1);
+    let run = kobuki.drive(setup.file.graph.rate_hz, 24.0);
+    let (mut p_fault_max, mut pairs) = (0.0_f64, 0);
+    for (k, mut frame) in (1..).zip(run.frames) {
+        // Then two sensors break, and one is silent.
+        let t_s = frame.header.t_capture_ns as f64 * 1e-9;
+        if t_s > 12.0 {
+            frame.set_channel(1, 9.0);
+            frame.set_channel(2, -1.5);
+        }
+        if t_s > 18.0 {
+            frame.channel_valid &= !0b1000;
+        }
+        let before = allocations();
+        detector.step(Entry::Frame(&frame), &mut detection, &mut particles);
+        let input = Input {
+            frame: &frame,
+            detection: Some((&detection, &particles)),
+        };
+        identifier.step(Entry::Frame(input), &mut diagnosis, &mut further);
+        let found = allocations() - before;
+        assert!(k <= WARM_UP || found == 0, "cycle {k}: {found}");
+        p_fault_max = p_fault_max.max(detection.p_fault);
+        pairs += u32::from(diagnosis.sets[0].leaves.count_ones() > 1);
+    }
+    assert!(
+        p_fault_max > 0.99 && pairs > 10,
+        "{p_fault_max}, {pairs} pairs"
+    );
 }
 
 fn demand_steady(setup: &Setup) {

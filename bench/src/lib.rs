@@ -15,6 +15,7 @@ pub mod corridors;
 pub mod field;
 pub mod ground_change;
 pub mod interval;
+pub mod large_robot;
 pub mod latency;
 pub mod launched;
 pub mod machine;

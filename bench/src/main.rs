@@ -67,6 +67,8 @@ enum Question {
     /// How near are the solver's bounds after a fixed time, and does every policy earn what it
     /// says?
     Solver(solver::Args),
+    /// How long does a step of detector and identifier take on a robot of 24 channels?
+    Step(step::Args),
     /// Are taped wheels of a real robot found, and told apart?
     TapedWheels,
     /// How much of a core does `vigil top` take?
@@ -108,6 +110,7 @@ impl Question {
             Self::Replay(args) => replay::run(args),
             Self::Size(args) => size::run(args),
             Self::Solver(args) => solver::run(args),
+            Self::Step(args) => step::run(args),
             Self::TapedWheels => taped_wheels::run(),
             Self::Top(args) => top::run(args),
             Self::Page => write_page(),

@@ -17,6 +17,7 @@ pub mod real_logs;
 pub mod replay;
 pub mod size;
 pub mod solver;
+pub mod step;
 pub mod taped_wheels;
 pub mod top;
 

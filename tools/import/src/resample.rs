@@ -66,7 +66,7 @@ impl Grid {
             .map(|i| vec![(i as f64 * self.period_s * 1e6).round() * 1e-6])
             .collect();
         for (channel, series) in log.in_order(columns).zip(series) {
-            self.check((log, robot), channel, series)?;
+            self.check(robot, channel, series)?;
             let is_command = channel.method == Method::Hold;
             let period_s = series.period_s();
             for (i, row) in rows.iter_mut().enumerate() {
@@ -77,6 +77,11 @@ impl Grid {
                 is_measured[i] |= !is_command && !pauses;
                 let is_lost = pauses && !robot.has_fault_models();
                 row.push(if is_lost { f64::NAN } else { value });
+            }
+        }
+        for (channel, series) in log.in_order(columns).zip(series) {
+            if channel.method == Method::Hold {
+                self.check_held(log, channel, (series, &is_measured))?;
             }
         }
         let mut is_measured = is_measured.into_iter();
@@ -120,44 +125,58 @@ impl Grid {
         }
     }
 
-    /// Refuses a value held for too long, and a long pause of a channel of the rover, for which the
-    /// last value would stand.
+    /// Refuses a long pause of a channel of the rover, for which the last value would stand.
     fn check(
         &self,
-        (log, robot): (&LogDescription, &Description),
+        robot: &Description,
         channel: &ChannelSource,
         series: &Series,
     ) -> Result<(), ImportError> {
-        let column = channel.column_names();
+        let is_refused = robot.has_fault_models() && channel.method != Method::Hold;
         let pairs = series.time_s.windows(2).map(|pair| pair[1] - pair[0]);
-        if channel.method != Method::Hold {
-            let mut pauses = pairs.enumerate().filter(|_| robot.has_fault_models());
-            return match pauses.find(|(_, gap_s)| *gap_s > GAP_MAX_S) {
-                None => Ok(()),
-                Some((at, gap_s)) => {
-                    let message = format!(
-                        "column {column}: a gap of {gap_s:.3} s, allowed is {GAP_MAX_S} s: cut the \
-                         run there"
-                    );
-                    Err(series.wrong(at + 1, message))
-                }
-            };
-        }
-        let end_s = self.start_s + (self.count - 1) as f64 * self.period_s;
-        for (at, &from_s) in series.time_s.iter().enumerate() {
-            let next_s = series.time_s.get(at + 1).copied().unwrap_or(f64::INFINITY);
-            let (until_s, limit_s) = (next_s.min(end_s), log.hold_max_s);
-            let held_s = until_s - from_s;
-            if until_s > self.start_s && held_s > limit_s {
-                return Err(series.wrong(
-                    at,
-                    format!(
-                        "column {column}: its value is held for {held_s:.3} s; hold_max_s allows \
-                         {limit_s} s: cut the run there, or raise it if only changes are recorded"
-                    ),
-                ));
+        let mut pauses = pairs.enumerate().filter(|_| is_refused);
+        match pauses.find(|(_, gap_s)| *gap_s > GAP_MAX_S) {
+            None => Ok(()),
+            Some((at, gap_s)) => {
+                let column = channel.column_names();
+                let message = format!(
+                    "column {column}: a gap of {gap_s:.3} s, allowed is {GAP_MAX_S} s: cut the run \
+                     there"
+                );
+                Err(series.wrong(at + 1, message))
             }
         }
-        Ok(())
+    }
+
+    /// Refuses a value that is held for too long; where no frame is, no time counts.
+    fn check_held(
+        &self,
+        log: &LogDescription,
+        channel: &ChannelSource,
+        (series, is_measured): (&Series, &[bool]),
+    ) -> Result<(), ImportError> {
+        let limit_s = log.hold_max_s;
+        let (mut held, mut frames) = (None, 0_usize);
+        let mut too_long = None;
+        let measured = is_measured.iter().enumerate().filter(|(_, is)| **is);
+        for (i, _) in measured {
+            let last = series.last_at(self.start_s + i as f64 * self.period_s);
+            if last != held && too_long.is_some() {
+                break;
+            }
+            frames = if last == held { frames + 1 } else { 0 };
+            held = last;
+            let held_s = frames as f64 * self.period_s;
+            too_long = last.filter(|_| held_s > limit_s).map(|at| (at, held_s));
+        }
+        let Some((at, held_s)) = too_long else {
+            return Ok(());
+        };
+        let column = channel.column_names();
+        let message = format!(
+            "column {column}: its value is held for {held_s:.3} s; hold_max_s allows {limit_s} s: \
+             cut the run there, or raise it if only changes are recorded"
+        );
+        Err(series.wrong(at, message))
     }
 }

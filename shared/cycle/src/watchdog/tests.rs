@@ -233,7 +233,7 @@ fn of_a_slow_source_too_a_pause_is_nobodys_failure_and_a_service_that_stands_sti
         let mut stuck = None;
         let mut of_second = |services: &mut Services, stuck: Option<u64>| {
             left -= 1;
-            source += u64::from(left > 0 || left < -5);
+            source += u64::from(!(-5..=0).contains(&left));
             services.run(1000, |service, health| {
                 health.answered_seq = match stuck {
                     Some(seq) if service == 1 => seq,

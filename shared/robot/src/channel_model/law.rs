@@ -9,15 +9,14 @@
 //! With `P` the precision of the law and `z` the residuals, a change by `x·s` is weighed by
 //! `b = sᵀPz` and `a = sᵀPs`: it lessens `zᵀPz` by `b²/a`.
 
-use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use vigil_checkpoint::Checkpoint;
 use vigil_inference::logspace::log_sum_exp;
 
 use super::CHANNELS_MAX;
+pub use super::square::{BLOCKS, Row, Square};
+use super::square::{along, dot, inverse, lower, masked, product, whitening};
 
-/// Blocks of a window.
-pub const BLOCKS: usize = 8;
 /// Length of each, s.
 pub const BLOCK_S: f64 = 0.5;
 /// Degrees of freedom of the law. Chosen on logs of a Husky, a Robotino and a Kobuki: with 4 a
@@ -31,11 +30,6 @@ const UNKNOWN: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
 const UNKNOWN_ONSETS: [usize; 4] = [0, 4, 6, 7];
 /// Sweeps over channels that were not measured, by which each gets the mean that the others give.
 const SWEEPS: usize = 3;
-
-/// A value for each block, the oldest first.
-pub type Row = [f64; BLOCKS];
-/// A square of such.
-pub type Square = [[f64; BLOCKS]; BLOCKS];
 
 /// A principal direction of the residuals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -59,31 +53,6 @@ impl Direction {
         };
         std::array::from_fn(|i| std::array::from_fn(|j| at(i.abs_diff(j))))
     }
-}
-
-/// Inverse of the lower right part of a positive definite square, from `first` on.
-fn inverse(square: &Square, first: usize) -> Option<Square> {
-    let n = BLOCKS - first;
-    let matrix = DMatrix::from_fn(n, n, |i, j| square[first + i][first + j]);
-    Some(lower_right(&matrix.cholesky()?.inverse(), first))
-}
-
-/// A square that is zero but for its lower right part, which begins with `first`.
-fn lower_right(part: &DMatrix<f64>, first: usize) -> Square {
-    let at = |i: usize, j: usize| match (i.checked_sub(first), j.checked_sub(first)) {
-        (Some(i), Some(j)) => part[(i, j)],
-        _ => 0.0,
-    };
-    std::array::from_fn(|i| std::array::from_fn(|j| at(i, j)))
-}
-
-/// Inverse of the Cholesky factor of the lower right part of a positive definite square.
-fn whitening(square: &Square, first: usize) -> Option<Square> {
-    let n = BLOCKS - first;
-    let matrix = DMatrix::from_fn(n, n, |i, j| square[first + i][first + j]);
-    let factor = matrix.cholesky()?.l();
-    let inverse = factor.solve_lower_triangular(&DMatrix::identity(n, n))?;
-    Some(lower_right(&inverse, first))
 }
 
 /// What a window `z`, whose precision matrix is `P`, says of a change `s`: the square of `z - x s`
@@ -118,8 +87,10 @@ pub struct Law {
     directions: Vec<Direction>,
     #[checkpoint(fixed)]
     precision: Vec<Square>,
-    /// What makes the values along each direction independent, the oldest first: its square is the
-    /// precision.
+    /// Its part on and below the diagonal, which counts half.
+    #[checkpoint(fixed)]
+    lower: Vec<Square>,
+    /// What makes the values along each direction independent, the oldest first, by columns.
     #[checkpoint(fixed)]
     whitening: Vec<Square>,
     /// Inverse of the covariance of one block, by rows.
@@ -184,6 +155,7 @@ impl Law {
             channels,
             first,
             directions: directions.to_vec(),
+            lower: precision.iter().map(lower).collect(),
             precision,
             whitening,
             spatial,
@@ -322,36 +294,51 @@ impl Law {
         out
     }
 
-    /// What a window says of a change of several channels at once, where the readings of one
-    /// channel may say nothing.
+    /// What a window says of a change of several channels at once, from each block on, where the
+    /// readings of one channel may say nothing.
     #[must_use]
-    pub fn joint_change(&self, signature: &[Row], silent: Option<usize>) -> Change {
+    pub fn joint_change(&self, signature: &[Row], silent: Option<usize>) -> [Change; BLOCKS] {
         let mut shown = [[0.0; BLOCKS]; CHANNELS_MAX];
         for (i, (row, read)) in signature.iter().zip(&self.read).enumerate() {
             shown[i] = masked(row, read);
         }
         let signature = &shown[..signature.len().min(CHANNELS_MAX)];
-        let rows = signature.iter().zip(&self.gradient);
-        let mut b = rows.map(|(s, gradient)| dot(s, gradient)).sum();
-        let (mut a, mut at_silent) = (0.0, [0.0; BLOCKS]);
-        for (direction, precision) in self.directions.iter().zip(&self.precision) {
+        let mut parts = [Change::NONE; BLOCKS];
+        for (row, gradient) in signature.iter().zip(&self.gradient) {
+            let products = row.iter().zip(gradient).map(|(s, gradient)| s * gradient);
+            let with = parts.iter_mut().zip(products);
+            with.for_each(|(part, product)| part.b += product);
+        }
+        // What each block of the signature is expected to show in the silent channel.
+        let mut at_silent = [[0.0; BLOCKS]; BLOCKS];
+        let laws = self.precision.iter().zip(&self.lower);
+        for (direction, (precision, lower)) in self.directions.iter().zip(laws) {
             let along = along(&direction.vector, signature);
-            let weighed = product(precision, &along);
-            a += dot(&along, &weighed);
-            if let Some(silent) = silent {
-                let share = direction.vector[silent];
-                at_silent
-                    .iter_mut()
-                    .zip(weighed)
-                    .for_each(|(sum, value)| *sum += share * value);
+            let later = product(lower, &along);
+            for ((part, s), later) in parts.iter_mut().zip(along).zip(later) {
+                part.a += 2.0 * s * later;
+            }
+            let Some(silent) = silent else { continue };
+            let share = direction.vector[silent];
+            for ((shows, row), s) in at_silent.iter_mut().zip(precision).zip(along) {
+                let shows = shows.iter_mut().zip(row);
+                shows.for_each(|(sum, p)| *sum += share * p * s);
             }
         }
-        if let Some(silent) = silent {
-            let known = product(&self.own_inverse[silent][0], &at_silent);
-            b -= dot(&known, &self.gradient[silent]);
-            a -= dot(&known, &at_silent);
+        let (mut so_far, mut shows) = (Change::NONE, [0.0; BLOCKS]);
+        let mut out = [Change::NONE; BLOCKS];
+        for first in (0..BLOCKS).rev() {
+            (so_far.b, so_far.a) = (so_far.b + parts[first].b, so_far.a + parts[first].a);
+            out[first] = so_far;
+            if let Some(silent) = silent {
+                let more = shows.iter_mut().zip(at_silent[first]);
+                more.for_each(|(sum, more)| *sum += more);
+                let known = product(&self.own_inverse[silent][0], &shows);
+                out[first].b -= dot(&known, &self.gradient[silent]);
+                out[first].a -= dot(&known, &shows);
+            }
         }
-        Change { b, a }
+        out
     }
 
     /// `P s` of a signature, by channel. Its product with another one says how alike both are.
@@ -465,24 +452,4 @@ impl Law {
         let least = self.square - less.min(self.square);
         (FREEDOM + least) / (FREEDOM + self.values() as f64)
     }
-}
-
-fn masked(row: &Row, read: &Row) -> Row {
-    std::array::from_fn(|block| row[block] * read[block])
-}
-
-fn along(vector: &[f64], rows: &[Row]) -> Row {
-    let mut out = [0.0; BLOCKS];
-    for (share, row) in vector.iter().zip(rows) {
-        out.iter_mut().zip(row).for_each(|(a, b)| *a += share * b);
-    }
-    out
-}
-
-fn product(square: &Square, row: &Row) -> Row {
-    std::array::from_fn(|i| dot(&square[i], row))
-}
-
-fn dot(a: &Row, b: &Row) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -13,8 +13,8 @@ const ALIKE_S: f64 = 1.0;
 /// First readings, whose median is the level: one of them may be a glitch.
 const FIRST: usize = 5;
 
-/// What wanders: a mean of all that was read, at first, then of about the last minute, that moves on
-/// at a rate of its own.
+/// What wanders: a mean of all that was read, at first, then of the last minute or so, that moves
+/// on at a rate of its own.
 #[derive(Debug, Clone, Copy, Default, CheckpointValue)]
 pub struct Trend {
     /// The mean.
@@ -30,10 +30,19 @@ impl Trend {
     }
 
     /// Takes a value that lies this step above the mean.
-    pub fn correct(&mut self, step: f64, [of_value, of_rate]: [f64; 2]) {
-        self.value += of_value * step;
-        self.rate_1_s += of_rate * step;
+    pub fn correct(&mut self, step: f64, gains: Gains) {
+        self.value += gains.value * step;
+        self.rate_1_s += gains.rate_1_s * step;
     }
+}
+
+/// Parts of a step by which a trend changes.
+#[derive(Debug, Clone, Copy)]
+pub struct Gains {
+    /// Its mean.
+    value: f64,
+    /// Its rate, 1/s.
+    rate_1_s: f64,
 }
 
 /// Time over which a trend was followed, s; at most that of its mean.
@@ -43,11 +52,13 @@ pub struct Followed {
 }
 
 impl Followed {
-    /// Parts of the step to a value that lasted `dt_s` by which the mean and its rate change.
-    pub fn gains(&mut self, dt_s: f64) -> [f64; 2] {
+    /// The gains of a value that lasted `dt_s`.
+    pub fn gains(&mut self, dt_s: f64) -> Gains {
         self.s = (self.s + dt_s).min(LEVEL_S);
-        let of_value = if self.s > 0.0 { dt_s / self.s } else { 1.0 };
-        [of_value, dt_s / (RATE_S * RATE_S)]
+        Gains {
+            value: if self.s > 0.0 { dt_s / self.s } else { 1.0 },
+            rate_1_s: dt_s / (RATE_S * RATE_S),
+        }
     }
 }
 
@@ -75,7 +86,7 @@ impl Level {
     /// Variance of a reading's distance from the level, over that of the reading.
     #[must_use]
     pub fn variance(&self) -> f64 {
-        1.0 + (ALIKE_S / self.followed.s.max(ALIKE_S))
+        1.0 + ALIKE_S / self.followed.s.max(ALIKE_S)
     }
 
     /// Takes a reading that lasted `dt_s` and lies so far `apart` from its prediction; after the

@@ -8,6 +8,8 @@
 //! Another rate adds its logarithm afterwards. Alarms do not depend on it, as their threshold moves
 //! by as much.
 
+mod explanation;
+
 use vigil_checkpoint::Checkpoint;
 use vigil_inference::logspace::{log_add, log_sum_exp};
 
@@ -41,9 +43,6 @@ const READY_S: f64 = 1.0;
 const RECORDED: f64 = 10.0;
 /// By how much rarer two faults are than one, nats. Chosen.
 const ANOTHER: f64 = 4.0;
-/// How much the logarithm of what a fault leaves unexplained, over what it explains, says against
-/// it. Chosen: no effect of a fault is exactly as described, and twice as much is 16 to 1.
-const DOUBT: f64 = 4.0;
 /// Log-odds of a component from which on it may be broken.
 const SUSPECT_LOG_ODDS: f64 = -2.0;
 
@@ -314,22 +313,7 @@ impl Monitor {
             }
         }
         self.divide_declared(&raw[..n], &mut odds[..n]);
-        let of_means = |by_class: &[f64; Class::ALL.len()]| {
-            let all = by_class.iter().enumerate();
-            all.filter(|(class, _)| *class != Class::Noise as usize)
-                .fold(IMPOSSIBLE, |most, (_, log_odds)| log_odds.max(most))
-        };
-        let single = &raw[..self.watched.len() - self.bank.declared().len()];
-        let single = single.iter().map(of_means).zip(&self.watched);
-        let single = single.max_by(|(one, _), (other, _)| one.total_cmp(other));
-        let explained = single.map_or([0.0; 2], |(log_odds, watched)| {
-            let log_ratio = log_odds - prior;
-            let at_best = match watched.part {
-                Part::Drive => self.bank.at_best(log_ratio),
-                _ => log_ratio,
-            };
-            [log_ratio, at_best]
-        });
+        let explained = self.explained_alone(prior, &raw);
         let pair = self.explain(prior, explained, (&mut odds[..n], &mut odds_unknown));
         for (slot, value) in odds.iter_mut().zip(odds_of_noise) {
             *slot = log_add(*slot, value);
@@ -337,79 +321,11 @@ impl Monitor {
         self.report_odds(&odds, log_add(odds_unknown, unknown_noise), pair);
     }
 
-    /// Divides what the window's means show among declared faults, other single ones, two at once,
-    /// and what none of them explains. What a name leaves has to be as in health, or less than what
-    /// it explains. `explained`: how much more likely the likeliest fault that is not declared makes
-    /// the window, and how much that may be at best. Returns the components of the two faults.
-    fn explain(
-        &self,
-        prior: f64,
-        explained: [f64; 2],
-        (odds, unknown): (&mut [f64], &mut f64),
-    ) -> Option<[usize; 2]> {
-        let pair = self.bank.pair();
-        let [mut explained, at_best] = explained;
-        let tail = |class: Class| self.tails[class as usize].as_ref();
-        let first = odds.len() - 1 - self.bank.declared().len();
-        let (single_odds, declared_odds) = odds.split_at_mut(first);
-        let (named, declared) = (log_sum_exp(single_odds), log_sum_exp(declared_odds));
-        let mut total = log_add(log_add(named, declared), *unknown);
-        let mut both = None;
-        if let Some(pair) = pair {
-            let log_odds = tempered(tail(Class::Pair), self.classes[Class::Pair as usize]);
-            total = log_add(total, log_odds - ANOTHER);
-            let slope = tail(Class::Unknown).map_or(1.0, |tail| tail.slope);
-            let more = slope * (pair.log_ratio - at_best) - ANOTHER;
-            if more > 0.0 {
-                explained = pair.log_ratio;
-                both = Some((pair.components, more));
-            }
-        }
-        // Labelled runs do not tell all that a declared fault changes: what it leaves says little.
-        let bounded = tempered(tail(Class::Unknown), prior + self.bank.unknown_bounded());
-        let against = declared - log_add(named, bounded);
-        let others = total - log_add(0.0, against);
-        let change = total - log_add(0.0, -against) - declared;
-        declared_odds.iter_mut().for_each(|one| *one += change);
-        let (further, doubt) = self.bank.unknown_beside(explained);
-        let further = tempered(tail(Class::Unknown), prior + further).min(DOUBT * doubt);
-        *unknown = others - log_add(0.0, -further);
-        let (more, of_named) = (
-            both.map_or(IMPOSSIBLE, |(_, more)| more),
-            others - log_add(0.0, further),
-        );
-        let change = of_named - log_add(0.0, more) - named;
-        single_odds.iter_mut().for_each(|one| *one += change);
-        let declared_pair = self.pair_components().map(|(components, _)| components);
-        match (both, declared_odds.last_mut()) {
-            (Some((components, more)), Some(slot)) => {
-                let odds = of_named - log_add(0.0, -more);
-                let is_likelier = declared_pair.is_none() || odds > *slot;
-                *slot = log_add(*slot, odds);
-                Some(components).filter(|_| is_likelier).or(declared_pair)
-            }
-            _ => declared_pair,
-        }
-    }
-
     /// Components of the two faults for which [`DeclaredFaults::pair`] speaks, and how much.
     fn pair_components(&self) -> Option<([usize; 2], f64)> {
         let first = self.watched.len() - self.bank.declared().len();
         let pair = self.bank.declared().pair()?;
         Some((pair.faults.map(|fault| first + fault), pair.further))
-    }
-
-    /// Divides what speaks for the declared faults among them, with the mean slope of their tails.
-    fn divide_declared(&self, raw: &[[f64; Class::ALL.len()]], odds: &mut [f64]) {
-        let tails = Class::DECLARED.iter();
-        let tails = tails.filter_map(|&class| self.tails[class as usize].as_ref());
-        let (sum, count) = tails.fold((0.0, 0.0), |(sum, count), tail| {
-            (sum + tail.slope, count + 1.0)
-        });
-        let slope = if count > 0.0 { sum / count } else { 1.0 };
-        let declared = self.bank.declared();
-        let first = odds.len() - 1 - declared.len();
-        declared.divide(slope, &raw[first..], &mut odds[first..]);
     }
 
     fn report_odds(&mut self, odds: &Odds, unknown: f64, pair: Option<[usize; 2]>) {

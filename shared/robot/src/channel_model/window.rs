@@ -6,6 +6,7 @@ use super::channel::{CLIP, Channel, Commands, Scales};
 use super::law::{BLOCK_S, BLOCKS, Row};
 use super::level::Level;
 use super::observation::History;
+use super::prediction::Predictor;
 use super::{CHANNELS_MAX, DRIVES_MAX};
 use crate::description::INTERVAL_MIN_S;
 
@@ -115,6 +116,8 @@ pub struct Window {
     #[checkpoint(fixed)]
     channels: Vec<(usize, Channel)>,
     #[checkpoint(fixed)]
+    predictor: Predictor,
+    #[checkpoint(fixed)]
     scales: Scales,
     /// Observations of a block.
     per_block: usize,
@@ -147,6 +150,7 @@ impl Window {
     pub fn new(channels: Vec<(usize, Channel)>, scales: Scales, interval_s: f64) -> Self {
         let per_block = ((BLOCK_S / interval_s).round() as usize).clamp(1, BLOCK_MAX);
         Self {
+            predictor: Predictor::new(channels.iter().map(|(_, channel)| channel)),
             channels,
             scales,
             per_block,
@@ -220,9 +224,8 @@ impl Window {
         let mut moment = NOTHING;
         moment.is_there = true;
         moment.moves = now.moving && now.moving_s >= MOVES_S;
-        let mut of_commands = [0.0; CHANNELS_MAX];
+        let of_commands = self.predictor.predict(commands, &self.scales);
         for (i, (place, channel)) in self.channels.iter().enumerate() {
-            of_commands[i] = channel.predict(commands, &self.scales);
             let apart = now.values[*place].map(|value| value - of_commands[i]);
             let apart = apart.filter(|_| channel.drifts);
             let predicted = of_commands[i] + self.level[i].advance(apart, now.dt_s);
@@ -248,12 +251,11 @@ impl Window {
             let more = commands.map(|command| {
                 std::array::from_fn(|axis| command[axis] + OFFSET * speed * drive.effect[axis])
             });
-            for (i, (_, channel)) in self.channels.iter().enumerate() {
-                let with = of_commands[i];
-                let without = channel.predict(&without, &self.scales);
-                let more = channel.predict(&more, &self.scales);
-                moment.share[d][i] = (with - without) * moment.unit[i];
-                moment.offset[d][i] = (more - with) * moment.unit[i];
+            let without = self.predictor.predict(&without, &self.scales);
+            let more = self.predictor.predict(&more, &self.scales);
+            for i in 0..self.channels.len() {
+                moment.share[d][i] = (of_commands[i] - without[i]) * moment.unit[i];
+                moment.offset[d][i] = (more[i] - of_commands[i]) * moment.unit[i];
             }
         }
         let newest = self.newest;

@@ -3,6 +3,7 @@
 #![cfg(test)]
 
 mod action_text;
+mod channel_law;
 mod channel_model;
 mod condition;
 mod contexts;

@@ -423,6 +423,8 @@ fn with_pauses(base: [f64; 2], gyro: [f64; 2]) -> Vec<ImportedRun> {
     cut("base.csv", 2, ';', 1e-3, base);
     cut("gyro.csv", 1, ',', 1.0, gyro);
     let mut log = log();
+    // The command is that of the base: no time in which nothing is measured counts as held.
+    log.hold_max_s = 1.0;
     // Both clocks as they are, and none that wraps within a pause.
     log.source[0].device_clock = None;
     for channel in &mut log.channel {

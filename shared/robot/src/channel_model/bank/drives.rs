@@ -54,19 +54,14 @@ impl Bank {
             (less, self.law().blocks(0) as f64 * ERRATIC.ln())
         });
         let mut rows = [[0.0; BLOCKS]; CHANNELS_MAX];
-        Weighed::over(JOINT_ONSETS.map(|first| {
-            for i in (0..n).filter(|i| Some(*i) != silent) {
-                rows[i] = std::array::from_fn(|block| match block >= first {
-                    true => -share[i][block],
-                    false => 0.0,
-                });
-            }
-            let change = self.law().joint_change(&rows[..n], silent);
-            Weighed {
-                log_ratio: self.law().log_ratio(free + change.less(), price),
-                age_s: self.window.block_s() * self.law().blocks(first) as f64,
-                ..Weighed::NONE
-            }
+        for i in (0..n).filter(|i| Some(*i) != silent) {
+            rows[i] = share[i].map(|value| -value);
+        }
+        let changes = self.law().joint_change(&rows[..n], silent);
+        Weighed::over(JOINT_ONSETS.map(|first| Weighed {
+            log_ratio: self.law().log_ratio(free + changes[first].less(), price),
+            age_s: self.window.block_s() * self.law().blocks(first) as f64,
+            ..Weighed::NONE
         }))
     }
 
@@ -74,15 +69,10 @@ impl Bank {
     fn moved(&self, signature: &[Row], sign: f64, shows: impl Fn(usize) -> bool) -> Weighed {
         let n = self.channels.len();
         let mut rows = [[0.0; BLOCKS]; CHANNELS_MAX];
-        Weighed::over(JOINT_ONSETS.map(|first| {
-            for i in 0..n {
-                let shown = shows(i);
-                rows[i] = std::array::from_fn(|block| match shown && block >= first {
-                    true => sign * signature[i][block],
-                    false => 0.0,
-                });
-            }
-            self.sized(self.law().joint_change(&rows[..n], None), SHARE_SD, first)
-        }))
+        for i in (0..n).filter(|&i| shows(i)) {
+            rows[i] = signature[i].map(|value| sign * value);
+        }
+        let changes = self.law().joint_change(&rows[..n], None);
+        Weighed::over(JOINT_ONSETS.map(|first| self.sized(changes[first], SHARE_SD, first)))
     }
 }
