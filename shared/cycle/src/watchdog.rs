@@ -213,8 +213,9 @@ impl Watchdog {
         if is_first || has_moved {
             watched.behind_ns = None;
         }
+        let most_ns = self.limits.logical_ns / 2;
         if let (true, Some(next)) = (has_moved, self.services.get_mut(service + 1)) {
-            next.input_moved(now_ns);
+            next.input_moved(now_ns, most_ns);
         }
     }
 
@@ -236,15 +237,22 @@ impl Watchdog {
 impl Peer {
     /// The stage before has moved on. Services report at instants of their own, so that this one
     /// may have told of the same frame before: only further moves say that it is behind, and a
-    /// pause between two of them, much longer than the one before, says nothing.
-    fn input_moved(&mut self, now_ns: u64) {
+    /// pause between two of them, much longer than the one before, says little. No move alone makes
+    /// a failure: `most_ns` is the most that it counts for.
+    fn input_moved(&mut self, now_ns: u64, most_ns: u64) {
         let since_ns = now_ns.saturating_sub(self.input_moved_ns);
         let is_pause = since_ns > LOOK_NS_MAX.max(self.input_interval_ns.saturating_mul(2));
+        let most_ns = if is_pause {
+            most_ns.min(LOOK_NS_MAX)
+        } else {
+            most_ns
+        };
         // It goes on reporting all the while: silence is another failure.
         let has_reported = self.reported_ns >= self.input_moved_ns;
-        let more_ns = match has_reported && !is_pause {
-            true => since_ns,
-            false => 0,
+        let more_ns = if has_reported {
+            since_ns.min(most_ns)
+        } else {
+            0
         };
         self.behind_ns = Some(self.behind_ns.map_or(0, |behind_ns| behind_ns + more_ns));
         (self.input_moved_ns, self.input_interval_ns) = (now_ns, since_ns);

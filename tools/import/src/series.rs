@@ -4,7 +4,6 @@ use std::f64::consts::PI;
 use std::path::PathBuf;
 
 use vigil_inference::angle::wrap;
-use vigil_recording::frames::GAP_MAX_S;
 
 use super::ImportError;
 use super::bag::CutBag;
@@ -355,7 +354,7 @@ impl Series {
         median(apart.collect()).unwrap_or(0.0)
     }
 
-    /// The value on the line between the samples around `t_s`; none in a long pause.
+    /// The value on the line between the samples around `t_s`.
     pub fn between(&self, t_s: f64) -> Option<f64> {
         let before = self.last_at(t_s)?;
         let (t0, v0) = (*self.time_s.get(before)?, *self.value.get(before)?);
@@ -363,7 +362,7 @@ impl Series {
             return Some(v0);
         }
         let (t1, v1) = (*self.time_s.get(before + 1)?, *self.value.get(before + 1)?);
-        (t1 - t0 <= GAP_MAX_S).then(|| v0 + (v1 - v0) * (t_s - t0) / (t1 - t0))
+        Some(v0 + (v1 - v0) * (t_s - t0) / (t1 - t0))
     }
 }
 

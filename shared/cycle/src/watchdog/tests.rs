@@ -246,11 +246,34 @@ fn of_a_slow_source_too_a_pause_is_nobodys_failure_and_a_service_that_stands_sti
             assert_eq!(of_second(&mut services, stuck), [], "{order:?}");
         }
         stuck = Some(services.health[1].answered_seq);
-        let found: Vec<_> = (0..3)
+        let found: Vec<_> = (0..6)
             .flat_map(|_| of_second(&mut services, stuck))
             .map(|(_, service, what)| (service, what))
             .collect();
         assert_eq!(found, [(1, WatchdogFinding::Logical)], "{order:?}");
+    }
+}
+
+#[test]
+fn a_report_that_is_read_after_that_of_a_slow_source_is_nobodys_failure() {
+    let mut services = Services::new();
+    // What a service tells of is read before its source, then one look after it.
+    services.order = [2, 1, 0];
+    let mut seq = 0;
+    for frame in 0..20 {
+        seq += 1;
+        for look in 0..60 {
+            let is_late = frame % 2 == 1 && look == 0;
+            let found = services.run(50, |service, health| {
+                health.answered_seq = if service == 1 && is_late {
+                    seq - 1
+                } else {
+                    seq
+                };
+                true
+            });
+            assert_eq!(found, [], "frame {frame}");
+        }
     }
 }
 

@@ -26,7 +26,7 @@ pub const IMPOSSIBLE: f64 = -700.0;
 
 /// Blocks of the window from which on a fault may have been there.
 pub const ONSETS: [usize; 6] = [0, 2, 4, 5, 6, 7];
-/// The same of faults that show in several channels.
+/// The same of faults whose effect grows or is late, and of declared ones.
 pub const JOINT_ONSETS: [usize; 3] = [0, 4, 6];
 /// Time in which a drift grows as large as a bias, s.
 const DRIFT_S: f64 = 4.0;
@@ -110,7 +110,7 @@ pub struct Laws {
     #[checkpoint(each)]
     pub mean: Vec<Law>,
     /// The law of whole windows in which a sensor's channels have nothing to do with the others, by
-    /// its component.
+    /// its component: within a block that of the others alone, and in time that of its directions.
     #[checkpoint(fixed)]
     pub without: Vec<Law>,
     /// None if the log does not tell it.
@@ -133,7 +133,8 @@ pub struct Bank {
     first_declared: usize,
     silent_s: [f64; CHANNELS_MAX],
     weighed: [[Weighed; KINDS_MAX]; COMPONENTS_MAX],
-    /// Component without whose channels the window is being weighed.
+    /// Component without whose channels the window is being weighed; none between two steps.
+    #[checkpoint(scratch)]
     left_out: Option<usize>,
     pair: Option<SensorPair>,
     unknown: f64,

@@ -34,7 +34,7 @@ pub(super) const NO_BELIEF: ComponentBelief = ComponentBelief {
 /// Two faults at once.
 #[derive(Debug, Clone, Copy, PartialEq, CheckpointValue)]
 pub struct PairBelief {
-    /// Probability that it is both, given that something is wrong.
+    /// Probability that it is two at once, most likely these, given that something is wrong.
     pub p: f64,
     /// Their components.
     pub components: [usize; 2],

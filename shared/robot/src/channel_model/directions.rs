@@ -63,7 +63,7 @@ fn is_process(direction: &Direction) -> bool {
 }
 
 /// Covariances by lag of channels of which some have nothing to do with the others: these then have
-/// their marginal law.
+/// the covariances that they have alone.
 #[must_use]
 pub fn parted(covariances: &[DMatrix<f64>], is_apart: impl Fn(usize) -> bool) -> Vec<DMatrix<f64>> {
     let of_lag = |whole: &DMatrix<f64>| {

@@ -66,7 +66,9 @@ fn residuals(
                 (level, level_of) = (Level::default(), *fold);
             }
             let mut predicted = model.predict(&commands(history), scales);
+            let mut variance = 1.0;
             if model.drifts {
+                variance = level.variance();
                 let apart = now.values[place].map(|value| value - predicted);
                 predicted += level.advance(apart, now.dt_s);
                 if let Some(apart) = apart {
@@ -87,7 +89,7 @@ fn residuals(
                     } else {
                         run
                     },
-                    apart: value - predicted,
+                    apart: (value - predicted) / f64::sqrt(variance),
                     predicted,
                     basis: Channel::basis(&now.command, scales, predicted, last),
                 });

@@ -35,19 +35,25 @@ pub(super) fn fit(
     for record in records {
         let mut trends = Trends::default();
         for (history, fold) in record.histories.iter().zip(&record.folds) {
+            if Some(*fold) == left_out {
+                trends = Trends::default();
+                continue;
+            }
+            let is_counted = counts(history, scales.lags);
+            // What counts for little is followed nevertheless.
+            let is_used = is_counted || channel.drifts && history.ago(scales.lags).is_some();
             let value = history.ago(0).and_then(|now| now.values[place]);
-            let Some(value) =
-                value.filter(|_| Some(*fold) != left_out && counts(history, scales.lags))
-            else {
+            let Some(value) = value.filter(|_| is_used) else {
                 continue;
             };
             let commands = commands(history);
             let terms = channel.terms.iter();
             let row: Vec<f64> = terms.map(|term| term.value(&commands, scales)).collect();
-            if !channel.drifts {
-                rows.extend(row);
-                values.push(value);
-            } else if let Some((row, value)) = trends.apart(channel, row, value, history) {
+            let found = match channel.drifts {
+                true => trends.apart(channel, row, value, history),
+                false => Some((row, value)),
+            };
+            if let Some((row, value)) = found.filter(|_| is_counted) {
                 rows.extend(row);
                 values.push(value);
             }
@@ -88,13 +94,16 @@ impl Trends {
     ) -> Option<(Vec<f64>, f64)> {
         let dt_s = history.ago(0)?.dt_s;
         let gains = self.followed.gains(dt_s);
+        let is_first = self.of_row.is_empty();
         let follow = |trend: &mut Trend, value: f64| {
+            if is_first {
+                trend.value = value;
+            }
             trend.advance(dt_s);
             let apart = value - trend.value;
             trend.correct(apart, gains);
             apart
         };
-        let is_first = self.of_row.is_empty();
         self.of_row.resize(row.len(), Trend::default());
         let apart = follow(&mut self.of_value, value);
         let all = row.iter_mut().zip(&mut self.of_row).zip(&channel.terms);

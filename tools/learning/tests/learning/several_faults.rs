@@ -123,3 +123,19 @@ fn a_robot_that_runs_away_from_a_rest_is_noticed_whatever_it_measures() {
         assert!((20.0..24.0).contains(&found_s), "{unasked:?}: {found_s} s");
     }
 }
+
+#[test]
+fn a_pose_that_is_wrong_in_all_it_tells_is_one_fault() {
+    let robot = robot(true);
+    let model = learned(&robot);
+    // It wanders off in a circle of its own.
+    let wrong = spoilt(7, |frame| {
+        let t_s = frame.header.t_capture_ns as f64 * 1e-9 - ONSET_S;
+        frame.channel[0] += 0.5 * t_s;
+        frame.channel[1] -= 0.4 * t_s;
+        let yaw = frame.channel[2] + 0.5 * t_s;
+        frame.channel[2] = vigil_inference::angle::wrap(yaw);
+    });
+    let found = shares(&model, &robot, &wrong, ["enc_L", "pose"]);
+    assert!(share(&found, "pose") > 0.8, "{found:?}");
+}

@@ -36,8 +36,8 @@ impl Bank {
     /// Looks for a second fault beside the sensor whose silence explains most, and adds what is
     /// said of that one if all its channels say nothing.
     ///
-    /// The likelihood of A and B is that of A saying nothing, times that of B under the law of all
-    /// channels but A's.
+    /// The likelihood of A and B is that of A saying nothing, times that of B under the law of the
+    /// other channels. A is the component of whose channels one alone explains most.
     pub(super) fn weigh_pair(&mut self) {
         self.pair = None;
         let (whole, values) = (self.law().square(), self.law().values() as f64);

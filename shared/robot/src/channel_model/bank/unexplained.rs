@@ -5,15 +5,18 @@ use super::Bank;
 /// Share of what a fault explains that it may leave because its effect is not quite as described:
 /// known to a fifth. Chosen.
 const MISFIT: f64 = 0.04;
+/// The same, of one block, because it began within one: half of the effect is not there.
+const PARTLY: f64 = 0.25;
 
 impl Bank {
     /// How much more likely the window may be with a fault that makes it so much more likely as it
-    /// is described.
+    /// is described, and has been there for so long at most.
     #[must_use]
-    pub fn at_best(&self, log_ratio: f64) -> f64 {
+    pub fn at_best(&self, log_ratio: f64, age_s: f64) -> f64 {
         let law = self.law();
         let left = law.left(log_ratio);
-        let misfit = MISFIT * (law.square() - left);
+        let whole_blocks = (age_s / self.window.block_s() - 1.0).max(1.0);
+        let misfit = MISFIT.max(PARTLY / whole_blocks) * (law.square() - left);
         let least = (left - misfit).max(law.values() as f64).min(left);
         log_ratio + law.log_ratio_at(left, left - least)
     }
@@ -25,7 +28,8 @@ impl Bank {
         self.law().log_ratio_larger(self.law().square(), 2.0)
     }
 
-    /// What is said of further faults if those that make the window so much more likely are there;
+    /// What is said of further faults, there throughout the window, if those that make it so much
+    /// more likely are there;
     /// and the logarithm of what is unusual then over what is usual with them alone.
     #[must_use]
     pub fn unknown_beside(&self, log_ratio: f64) -> (f64, f64) {

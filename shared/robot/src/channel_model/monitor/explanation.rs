@@ -5,7 +5,7 @@ use vigil_inference::logspace::{log_add, log_sum_exp};
 
 use super::{ANOTHER, ClassOdds, IMPOSSIBLE, Monitor, tempered};
 use crate::channel_model::model::Class;
-use crate::channel_model::watched::Part;
+use crate::channel_model::watched::{Part, likeliest};
 
 /// How much the logarithm of what a fault leaves unexplained, over what it explains, says against
 /// it. Chosen: no effect of a fault is exactly as described, and twice as much is 16 to 1.
@@ -21,12 +21,16 @@ impl Monitor {
                 .fold(IMPOSSIBLE, |most, (_, log_odds)| log_odds.max(most))
         };
         let single = &raw[..self.watched.len() - self.bank.declared().len()];
-        let single = single.iter().map(of_means).zip(&self.watched);
-        let single = single.max_by(|(one, _), (other, _)| one.total_cmp(other));
-        single.map_or([0.0; 2], |(log_odds, watched)| {
+        let single = single.iter().map(of_means).enumerate();
+        let single = single.max_by(|(_, one), (_, other)| one.total_cmp(other));
+        single.map_or([0.0; 2], |(component, log_odds)| {
             let log_ratio = log_odds - prior;
-            let at_best = match watched.part {
-                Part::Drive => self.bank.at_best(log_ratio),
+            let part = self.watched[component].part;
+            let at_best = match part {
+                Part::Drive => {
+                    let likeliest = likeliest(self.bank.weighed(component), part);
+                    self.bank.at_best(log_ratio, likeliest.age_s)
+                }
                 _ => log_ratio,
             };
             [log_ratio, at_best]

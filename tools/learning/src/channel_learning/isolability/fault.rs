@@ -110,10 +110,9 @@ impl Fault {
     /// True if it is looked for from that block of the window on.
     pub fn is_tried(&self, first: usize) -> bool {
         match self.kind {
-            FaultKind::Bias | FaultKind::Gain | FaultKind::Frozen | FaultKind::Zero => {
-                ONSETS.contains(&first)
-            }
-            _ => JOINT_ONSETS.contains(&first),
+            FaultKind::Drift | FaultKind::Delay | FaultKind::Shift => JOINT_ONSETS.contains(&first),
+            _ if matches!(self.origin, Origin::Drive { .. }) => true,
+            _ => ONSETS.contains(&first),
         }
     }
 }
@@ -237,7 +236,7 @@ fn drive_faults(part: &Component, place: usize, wheel: Option<usize>) -> Vec<Fau
             _ => Extent::any(LOST, SHARE_SD / LOST),
         },
         unit: String::new(),
-        price: ((KINDS_MAX * JOINT_ONSETS.len()) as f64).ln(),
+        price: ((KINDS_MAX * BLOCKS) as f64).ln(),
         class: Class::Drive,
     };
     kinds.into_iter().map(fault).collect()
