@@ -1,14 +1,11 @@
 //! Faults of drives: what each changes in all channels at once.
 
-use super::{Bank, DrivePlace, ERRATIC, Weighed};
+use super::{Bank, DRIVE_ONSETS, DrivePlace, ERRATIC, Weighed};
 use crate::channel_model::CHANNELS_MAX;
 use crate::channel_model::component::Quantity;
 use crate::channel_model::fault_kind::{DRIVE_KINDS, FaultKind, SHARE_SD};
 use crate::channel_model::law::{BLOCKS, Row};
 use crate::channel_model::window::OFFSET;
-
-/// Blocks from which on a drive may be broken: all, as one weighing says all.
-const ALL: [usize; BLOCKS] = [0, 1, 2, 3, 4, 5, 6, 7];
 
 impl Bank {
     pub(super) fn weigh_drive(&mut self, drive: usize) {
@@ -61,7 +58,7 @@ impl Bank {
             rows[i] = share[i].map(|value| -value);
         }
         let changes = self.law().joint_change(&rows[..n], silent);
-        Weighed::over(ALL.map(|first| Weighed {
+        Weighed::over(DRIVE_ONSETS.map(|first| Weighed {
             log_ratio: self.law().log_ratio(free + changes[first].less(), price),
             age_s: self.window.block_s() * self.law().blocks(first) as f64,
             ..Weighed::NONE
@@ -76,6 +73,6 @@ impl Bank {
             rows[i] = signature[i].map(|value| sign * value);
         }
         let changes = self.law().joint_change(&rows[..n], None);
-        Weighed::over(ALL.map(|first| self.sized(changes[first], SHARE_SD, first)))
+        Weighed::over(DRIVE_ONSETS.map(|first| self.sized(changes[first], SHARE_SD, first)))
     }
 }

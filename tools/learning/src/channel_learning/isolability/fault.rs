@@ -1,7 +1,9 @@
 //! The faults that are compared, and what each changes of a window.
 
 use vigil_robot::Description;
-use vigil_robot::channel_model::bank::{DELAYS, HELD, JOINT_ONSETS, KINDS_MAX, ONSETS};
+use vigil_robot::channel_model::bank::{
+    DELAYS, DRIVE_ONSETS, HELD, JOINT_ONSETS, KINDS_MAX, ONSETS,
+};
 use vigil_robot::channel_model::fault_kind::{FaultKind, GAIN_SD, SHARE_SD, bias_sd};
 use vigil_robot::channel_model::law::{BLOCK_S, BLOCKS, Law, Row};
 use vigil_robot::channel_model::model::Class;
@@ -111,7 +113,7 @@ impl Fault {
     pub fn is_tried(&self, first: usize) -> bool {
         match self.kind {
             FaultKind::Drift | FaultKind::Delay | FaultKind::Shift => JOINT_ONSETS.contains(&first),
-            _ if matches!(self.origin, Origin::Drive { .. }) => true,
+            _ if matches!(self.origin, Origin::Drive { .. }) => DRIVE_ONSETS.contains(&first),
             _ => ONSETS.contains(&first),
         }
     }
@@ -236,7 +238,7 @@ fn drive_faults(part: &Component, place: usize, wheel: Option<usize>) -> Vec<Fau
             _ => Extent::any(LOST, SHARE_SD / LOST),
         },
         unit: String::new(),
-        price: ((KINDS_MAX * BLOCKS) as f64).ln(),
+        price: ((KINDS_MAX * DRIVE_ONSETS.len()) as f64).ln(),
         class: Class::Drive,
     };
     kinds.into_iter().map(fault).collect()
