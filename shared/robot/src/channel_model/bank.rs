@@ -26,8 +26,8 @@ pub const IMPOSSIBLE: f64 = -700.0;
 
 /// Blocks of the window from which on a fault may have been there.
 pub const ONSETS: [usize; 6] = [0, 2, 4, 5, 6, 7];
-/// The same of drives: with the newest block among them, what a healthy one does for a moment passes
-/// for a fault of it.
+/// The same of drives: with the newest block among them, what a healthy one does for a moment
+/// passes for a fault of it.
 pub const DRIVE_ONSETS: [usize; 5] = [0, 2, 4, 5, 6];
 /// The same of faults whose effect grows or is late, and of declared ones.
 pub const JOINT_ONSETS: [usize; 3] = [0, 4, 6];
