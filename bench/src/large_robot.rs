@@ -44,10 +44,8 @@ pub fn description() -> Result<Description, Box<dyn Error>> {
         let (x, y) = (0.4 * (i / 2) as f64 - 0.4, side(i) * HALF_TRACK_M);
         format!("{{ name = \"W{i}\", x = {x}, y = {y}, steered = false }}")
     });
-    let further = (0..FURTHER).map(|i| {
-        let unit = "bar";
-        format!("[[channel]]\nname = \"further_{i}\"\nunit = \"{unit}\"\n")
-    });
+    let further =
+        (0..FURTHER).map(|i| format!("[[channel]]\nname = \"further_{i}\"\nunit = \"bar\"\n"));
     let declared = (0..DECLARED).map(|i| {
         let (one, other) = (i % FURTHER, i % WHEELS);
         format!("[[fault]]\nname = \"F{i}\"\nshows = [\"further_{one}\", \"current_W{other}\"]\n")

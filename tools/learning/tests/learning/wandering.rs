@@ -4,6 +4,7 @@ use vigil_blocks::SensorFrame;
 use vigil_learning::channel_learning::{Log, learn};
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
+use vigil_robot::channel_model::Model;
 use vigil_robot::slot::Slot;
 
 use super::channel_sensing::{alarm, run, stop_and_go};
@@ -37,14 +38,19 @@ fn supply(run: &mut Run, (from, falls_1_s): (f64, f64)) {
     }
 }
 
-#[test]
-fn a_battery_that_empties_is_no_fault_and_one_that_breaks_down_is() {
-    let robot = robot("");
+/// The model of two runs in which the battery empties.
+fn learned(robot: &Description) -> Model {
     let runs = [
         discharge(0, 400.0, (25.0, 5e-4)),
         discharge(1, 400.0, (24.6, 5e-4)),
     ];
-    let (model, _) = learn(&Log::of_healthy(&runs), &robot).unwrap();
+    learn(&Log::of_healthy(&runs), robot).unwrap().0
+}
+
+#[test]
+fn a_battery_that_empties_is_no_fault_and_one_that_breaks_down_is() {
+    let robot = robot("");
+    let model = learned(&robot);
     // Far below all that was learned from, from the start and in the end.
     for (id, from) in [(10, 24.8), (11, 22.0), (12, 27.0)] {
         let healthy = discharge(id, 1200.0, (from, 8e-4));
@@ -68,11 +74,7 @@ fn a_battery_that_empties_is_no_fault_and_one_that_breaks_down_is() {
 #[test]
 fn a_level_that_no_log_has_shown_hides_no_fault_of_another_component() {
     let robot = robot("");
-    let runs = [
-        discharge(0, 400.0, (25.0, 5e-4)),
-        discharge(1, 400.0, (24.6, 5e-4)),
-    ];
-    let (model, _) = learn(&Log::of_healthy(&runs), &robot).unwrap();
+    let model = learned(&robot);
     // The left wheel does half of what it is told.
     let obeys = |t_s: f64| match stop_and_go(t_s) {
         moves if t_s < ONSET_S => moves,
@@ -97,11 +99,7 @@ fn a_level_that_no_log_has_shown_hides_no_fault_of_another_component() {
 #[test]
 fn a_glitch_at_the_start_is_no_level() {
     let robot = robot("");
-    let runs = [
-        discharge(0, 400.0, (25.0, 5e-4)),
-        discharge(1, 400.0, (24.6, 5e-4)),
-    ];
-    let (model, _) = learn(&Log::of_healthy(&runs), &robot).unwrap();
+    let model = learned(&robot);
     for glitch in [0.0, 1e308, -1e308] {
         let mut healthy = discharge(40, 300.0, (24.8, 5e-4));
         for frame in healthy.frames.iter_mut().take(4) {
