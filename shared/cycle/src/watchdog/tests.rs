@@ -259,11 +259,9 @@ fn a_report_that_is_read_after_that_of_a_slow_source_is_nobodys_failure() {
     let mut services = Services::new();
     // What a service tells of is read before its source, then one look after it.
     services.order = [2, 1, 0];
-    let mut seq = 0;
-    for frame in 0..20 {
-        seq += 1;
+    for seq in 1..=20 {
         for look in 0..60 {
-            let is_late = frame % 2 == 1 && look == 0;
+            let is_late = seq % 2 == 0 && look == 0;
             let found = services.run(50, |service, health| {
                 health.answered_seq = if service == 1 && is_late {
                     seq - 1
@@ -272,7 +270,7 @@ fn a_report_that_is_read_after_that_of_a_slow_source_is_nobodys_failure() {
                 };
                 true
             });
-            assert_eq!(found, [], "frame {frame}");
+            assert_eq!(found, [], "frame {seq}");
         }
     }
 }
