@@ -3,19 +3,19 @@
 mod declared;
 mod drives;
 pub mod pair;
+mod sensors;
 mod unexplained;
 
 use vigil_checkpoint::{Checkpoint, CheckpointValue};
-use vigil_inference::logspace::log_sum_exp;
 
 use super::component::Target;
 use super::declared_faults::DeclaredFaults;
-use super::fault_kind::{FaultKind, GAIN_SD, SENSOR_KINDS, bias_sd};
-use super::law::{BLOCKS, Change, Law, Row};
+use super::fault_kind::{SENSOR_KINDS, bias_sd};
+use super::law::{BLOCKS, Change, Law};
 use super::orders::WheelOrders;
 use super::scatter::ScatterLaw;
 use super::signature::Terms;
-use super::window::{DELAY_BLOCKS, Window};
+use super::window::Window;
 use super::{CHANNELS_MAX, COMPONENTS_MAX};
 use pair::SensorPair;
 
@@ -31,18 +31,10 @@ pub const ONSETS: [usize; 6] = [0, 2, 4, 5, 6, 7];
 pub const DRIVE_ONSETS: [usize; 5] = [0, 2, 4, 5, 6];
 /// The same of faults whose effect grows or is late, and of declared ones.
 pub const JOINT_ONSETS: [usize; 3] = [0, 4, 6];
-/// Time in which a drift grows as large as a bias, s.
-const DRIFT_S: f64 = 4.0;
-/// Delays that are looked for, in blocks; one with a size of its own between them.
-pub const DELAYS: [f64; 4] = [0.5, 1.0, 2.0, DELAY_BLOCKS as f64];
 /// Deviation of an erratic sensor's readings, relative to that of a whole one given all others.
 pub const ERRATIC: f64 = 6.0;
 /// The value at which a sensor has frozen is one number more: its price in nats.
 pub const HELD: f64 = 2.0;
-/// Silence after which a channel is missing, s, if it was never silent for half as long, and how
-/// much that says.
-const MISSING_S: f64 = 1.0;
-const MISSING: f64 = 30.0;
 /// Roughness of a robot of which several channels are noisier at once, relative to that of a
 /// healthy one.
 const UNKNOWN_NOISE: f64 = 3.0;
@@ -67,21 +59,6 @@ impl Weighed {
         size_sd: 0.0,
         age_s: 0.0,
     };
-
-    /// A mean over onsets that are equally probable: the likeliest one gives the size.
-    fn over<const N: usize>(onsets: [Self; N]) -> Self {
-        let best = onsets.into_iter().fold(Self::NONE, |best, one| {
-            if one.log_ratio > best.log_ratio {
-                one
-            } else {
-                best
-            }
-        });
-        Self {
-            log_ratio: log_sum_exp(&onsets.map(|one| one.log_ratio)) - (N as f64).ln(),
-            ..best
-        }
-    }
 }
 
 /// A channel that is predicted.
@@ -290,84 +267,43 @@ impl Bank {
         true
     }
 
-    fn weigh_sensor(&mut self, channel: usize) {
-        let component = self.channels[channel].component;
-        // The velocities of one pose share a component.
-        let shares = self.components().filter(|&other| other == component);
-        let price = (shares.count().max(1) as f64).ln();
-        let found = SENSOR_KINDS.map(|kind| self.sensor(channel, kind));
-        for (slot, found) in self.weighed[component].iter_mut().zip(found) {
-            let log_ratio = found.log_ratio - price;
-            let sum = log_sum_exp(&[slot.log_ratio, log_ratio]);
-            if log_ratio > slot.log_ratio {
-                *slot = found;
-            }
-            slot.log_ratio = sum.max(IMPOSSIBLE);
-        }
-    }
-
-    fn sensor(&self, channel: usize, kind: FaultKind) -> Weighed {
-        let place = &self.channels[channel];
-        let quantity = place.target.quantity;
-        let window = &self.window;
-        let (unit, predicted) = (&window.unit[channel], &window.predicted[channel]);
-        // A sensor that repeats itself is not as rough as it was.
-        let still = || {
-            let newest = self.window.newest_roughness[channel];
-            let scatter = self.laws.scatter.as_ref();
-            scatter.map_or(0.0, |scatter| scatter.still(channel, newest))
+    /// A fault that may have been there from each of these blocks on, and the likeliest of these:
+    /// it lessens the square by so much, and the density by a factor besides.
+    fn begun<const N: usize>(
+        &self,
+        onsets: [usize; N],
+        less: impl Fn(usize) -> f64,
+        density: impl Fn(usize) -> f64,
+    ) -> (Weighed, usize) {
+        let (law, density) = (self.law(), onsets.map(density));
+        let likelihoods = law.likelihoods(onsets.map(less), density);
+        let first = onsets[likelihoods.likeliest()];
+        let weighed = Weighed {
+            log_ratio: likelihoods.log_mean(),
+            age_s: self.window.block_s() * law.blocks(first) as f64,
+            ..Weighed::NONE
         };
-        let bias_sd = self.bias_sd(channel);
-        match kind {
-            FaultKind::Bias => self.added(channel, unit, bias_sd),
-            FaultKind::Gain => {
-                let change = self.added(channel, predicted, GAIN_SD);
-                Weighed {
-                    size: 1.0 + change.size,
-                    ..change
-                }
-            }
-            // The velocity of a pose that drifts is biased, and one that stands is zero.
-            FaultKind::Drift | FaultKind::Frozen if quantity.is_pose() => Weighed::NONE,
-            FaultKind::Drift => self.drifting(channel, bias_sd / DRIFT_S),
-            FaultKind::Frozen => self.replaced(
-                channel,
-                |first, block| {
-                    let (mut sum, mut count) = (0.0, 0.0);
-                    for k in first..BLOCKS {
-                        if unit[k] > 0.0 {
-                            sum += (self.law().row(channel)[k] + predicted[k]) / unit[k];
-                            count += 1.0;
-                        }
-                    }
-                    let held = if count > 0.0 { sum / count } else { 0.0 };
-                    held * unit[block] - predicted[block]
-                },
-                HELD - still(),
-            ),
-            FaultKind::Zero => self.replaced(channel, |_, block| -predicted[block], -still()),
-            FaultKind::Delay => self.delayed(channel),
-            FaultKind::Erratic => self.erratic(channel),
-            FaultKind::Noise => self.noisier(|i| i == channel),
-            FaultKind::Missing if self.silent_s[channel] > MISSING_S.max(2.0 * place.silence_s) => {
-                Weighed {
-                    log_ratio: MISSING,
-                    age_s: self.silent_s[channel],
-                    ..Weighed::NONE
-                }
-            }
-            _ => Weighed::NONE,
-        }
+        (weighed, first)
     }
 
-    /// Deviation of a bias of a channel.
-    fn bias_sd(&self, channel: usize) -> f64 {
-        let unit = &self.window.unit[channel];
-        let units = unit
-            .iter()
-            .fold(0.0, |sum, unit| sum + unit / BLOCKS as f64);
-        let deviation = if units > 0.0 { 1.0 / units } else { 0.0 };
-        bias_sd(self.channels[channel].usual, deviation)
+    /// A change of so much times a signature, with a size of this deviation.
+    fn sized<const N: usize>(
+        &self,
+        onsets: [usize; N],
+        changes: &[Change; BLOCKS],
+        size_sd: f64,
+    ) -> Weighed {
+        let prior = 1.0 / (size_sd * size_sd).max(1e-300);
+        let precision = |first: usize| changes[first].a + prior;
+        let less = |first: usize| changes[first].b * changes[first].b / precision(first);
+        let density = |first: usize| (prior / precision(first)).sqrt();
+        let (weighed, first) = self.begun(onsets, less, density);
+        let variance_scale = self.law().variance_scale(less(first));
+        Weighed {
+            size: changes[first].b / precision(first),
+            size_sd: (variance_scale / precision(first)).sqrt(),
+            ..weighed
+        }
     }
 
     /// More noise of some channels.
@@ -384,96 +320,13 @@ impl Bank {
         }
     }
 
-    /// A change of so much times the signature, with a size of this deviation.
-    fn sized(&self, change: Change, size_sd: f64, first: usize) -> Weighed {
-        let Change { b, a } = change;
-        let prior = 1.0 / (size_sd * size_sd).max(1e-300);
-        let (precision, penalty) = (a + prior, 0.5 * (1.0 + a / prior).ln());
-        let less = b * b / precision;
-        Weighed {
-            log_ratio: self.law().log_ratio(less, penalty),
-            size: b / precision,
-            size_sd: (self.law().variance_scale(less) / precision).sqrt(),
-            age_s: self.window.block_s() * self.law().blocks(first) as f64,
-        }
-    }
-
-    fn added(&self, channel: usize, signature: &Row, size_sd: f64) -> Weighed {
-        let changes = self.law().change(channel, signature);
-        Weighed::over(ONSETS.map(|first| self.sized(changes[first], size_sd, first)))
-    }
-
-    fn drifting(&self, channel: usize, size_sd: f64) -> Weighed {
+    /// Deviation of a bias of a channel.
+    fn bias_sd(&self, channel: usize) -> f64 {
         let unit = &self.window.unit[channel];
-        Weighed::over(JOINT_ONSETS.map(|first| {
-            let grown: Row = std::array::from_fn(|block| {
-                let blocks = block.saturating_sub(first) as f64 + 0.5;
-                if block < first {
-                    0.0
-                } else {
-                    unit[block] * self.window.block_s() * blocks
-                }
-            });
-            self.sized(self.law().change(channel, &grown)[0], size_sd, first)
-        }))
-    }
-
-    fn delayed(&self, channel: usize) -> Weighed {
-        let tried = DELAYS.map(|blocks| {
-            let late = self.window.delayed(channel, blocks);
-            let changes = self.law().change(channel, &late);
-            let of = |first: usize| self.law().log_ratio(changes[first].less(), 0.0);
-            Weighed {
-                log_ratio: log_sum_exp(&JOINT_ONSETS.map(of)) - (JOINT_ONSETS.len() as f64).ln(),
-                size: self.window.block_s() * blocks,
-                size_sd: 0.25 * self.window.block_s() * blocks,
-                age_s: self.window.block_s() * BLOCKS as f64,
-            }
-        });
-        let weights = tried.map(|one| one.log_ratio);
-        let total = log_sum_exp(&weights);
-        let share = |one: &Weighed| (one.log_ratio - total).exp();
-        let size: f64 = tried.iter().map(|one| share(one) * one.size).sum();
-        let apart = |one: &Weighed| {
-            let apart = one.size - size;
-            share(one) * (apart * apart + one.size_sd * one.size_sd)
-        };
-        Weighed {
-            log_ratio: total - (DELAYS.len() as f64).ln(),
-            size,
-            size_sd: tried.iter().map(apart).sum::<f64>().sqrt(),
-            age_s: self.window.block_s() * BLOCKS as f64,
-        }
-    }
-
-    /// Readings that say nothing of the truth, but are this.
-    fn replaced(&self, channel: usize, read: impl Fn(usize, usize) -> f64, price: f64) -> Weighed {
-        let z = self.law().row(channel);
-        Weighed::over(ONSETS.map(|first| {
-            let (less, _) = self.law().deviation(channel, first);
-            let apart: Row = std::array::from_fn(|block| match block < first {
-                true => 0.0,
-                false => z[block] - read(first, block),
-            });
-            let left = self.law().own_square(channel, &apart);
-            Weighed {
-                log_ratio: self.law().log_ratio(less - left, price),
-                age_s: self.window.block_s() * self.law().blocks(first) as f64,
-                ..Weighed::NONE
-            }
-        }))
-    }
-
-    fn erratic(&self, channel: usize) -> Weighed {
-        Weighed::over(ONSETS.map(|first| {
-            let (less, _) = self.law().deviation(channel, first);
-            let penalty = self.law().blocks(first) as f64 * ERRATIC.ln();
-            let less = less * (1.0 - 1.0 / (ERRATIC * ERRATIC));
-            Weighed {
-                log_ratio: self.law().log_ratio(less, penalty),
-                age_s: self.window.block_s() * self.law().blocks(first) as f64,
-                ..Weighed::NONE
-            }
-        }))
+        let units = unit
+            .iter()
+            .fold(0.0, |sum, unit| sum + unit / BLOCKS as f64);
+        let deviation = if units > 0.0 { 1.0 / units } else { 0.0 };
+        bias_sd(self.channels[channel].usual, deviation)
     }
 }

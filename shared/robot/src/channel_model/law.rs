@@ -9,13 +9,21 @@
 //! With `P` the precision of the law and `z` the residuals, a change by `x·s` is weighed by
 //! `b = sᵀPz` and `a = sᵀPs`: it lessens `zᵀPz` by `b²/a`.
 
+mod joint_signature;
+mod likelihoods;
+
 use serde::{Deserialize, Serialize};
 use vigil_checkpoint::Checkpoint;
 use vigil_inference::logspace::log_sum_exp;
 
 use super::CHANNELS_MAX;
 pub use super::square::{BLOCKS, Row, Square};
-use super::square::{along, dot, inverse, lower, masked, product, whitening};
+use super::square::{
+    along, by_block, dot, inverse, lower, product, sums_from, whitening, whitening_backwards,
+};
+
+pub use joint_signature::JointSignature;
+pub use likelihoods::Likelihoods;
 
 /// Length of each, s.
 pub const BLOCK_S: f64 = 0.5;
@@ -57,7 +65,7 @@ impl Direction {
 
 /// What a window `z`, whose precision matrix is `P`, says of a change `s`: the square of `z - x s`
 /// is that of `z` less `2 x b - x^2 a`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Change {
     /// `s' P z`.
     pub b: f64,
@@ -66,8 +74,6 @@ pub struct Change {
 }
 
 impl Change {
-    const NONE: Self = Self { b: 0.0, a: 0.0 };
-
     /// By how much the square lessens if the change is there in full.
     #[must_use]
     pub fn less(&self) -> f64 {
@@ -96,11 +102,12 @@ pub struct Law {
     /// Inverse of the covariance of one block, by rows.
     #[checkpoint(fixed)]
     spatial: Vec<f64>,
-    /// Precision of each channel's blocks given all others, and its inverse from each block on.
+    /// Precision of each channel's blocks given all others: its part on and below the diagonal,
+    /// which counts half, and what makes values of that covariance independent, the newest first.
     #[checkpoint(fixed)]
-    own: Vec<Square>,
+    own_lower: Vec<Square>,
     #[checkpoint(fixed)]
-    own_inverse: Vec<[Square; BLOCKS]>,
+    own_whitening: Vec<Square>,
     /// The window, completed: residuals by channel, and `Pz`.
     z: [Row; CHANNELS_MAX],
     /// One where a reading is there, else zero.
@@ -143,14 +150,7 @@ impl Law {
                 }
             }
         }
-        let mut own_inverse = Vec::with_capacity(channels);
-        for square in &own {
-            let mut all = [[[0.0; BLOCKS]; BLOCKS]; BLOCKS];
-            for (from, slot) in all.iter_mut().enumerate() {
-                *slot = inverse(square, from.max(first))?;
-            }
-            own_inverse.push(all);
-        }
+        let own_whitening = own.iter().map(|own| whitening_backwards(own, first));
         Some(Self {
             channels,
             first,
@@ -159,8 +159,8 @@ impl Law {
             precision,
             whitening,
             spatial,
-            own,
-            own_inverse,
+            own_lower: own.iter().map(lower).collect(),
+            own_whitening: own_whitening.collect::<Option<_>>()?,
             z: [[0.0; BLOCKS]; CHANNELS_MAX],
             read: [[0.0; BLOCKS]; CHANNELS_MAX],
             gradient: [[0.0; BLOCKS]; CHANNELS_MAX],
@@ -215,7 +215,7 @@ impl Law {
         self.square = self.parts.iter().sum();
         // What was not measured speaks for nothing.
         for (row, read) in self.gradient.iter_mut().zip(&self.read) {
-            *row = masked(row, read);
+            *row = by_block(row, read);
         }
     }
 
@@ -255,7 +255,7 @@ impl Law {
     /// A change of a channel, where it was measured.
     #[must_use]
     pub fn masked(&self, channel: usize, row: &Row) -> Row {
-        masked(row, &self.read[channel])
+        by_block(row, &self.read[channel])
     }
 
     /// Square of the window under the law: its expectation is the number of its values.
@@ -279,66 +279,13 @@ impl Law {
     /// What a window says of a change of one channel, from each block on.
     #[must_use]
     pub fn change(&self, channel: usize, signature: &Row) -> [Change; BLOCKS] {
-        let (own, gradient) = (&self.own[channel], &self.gradient[channel]);
-        let signature = masked(signature, &self.read[channel]);
-        let (mut b, mut a) = (0.0, 0.0);
-        let mut out = [Change::NONE; BLOCKS];
-        for first in (0..BLOCKS).rev() {
-            let cross: f64 = (first + 1..BLOCKS)
-                .map(|k| own[first][k] * signature[k])
-                .sum();
-            b += signature[first] * gradient[first];
-            a += signature[first] * (own[first][first] * signature[first] + 2.0 * cross);
-            out[first] = Change { b, a };
-        }
-        out
-    }
-
-    /// What a window says of a change of several channels at once, from each block on, where the
-    /// readings of one channel may say nothing.
-    #[must_use]
-    pub fn joint_change(&self, signature: &[Row], silent: Option<usize>) -> [Change; BLOCKS] {
-        let mut shown = [[0.0; BLOCKS]; CHANNELS_MAX];
-        for (i, (row, read)) in signature.iter().zip(&self.read).enumerate() {
-            shown[i] = masked(row, read);
-        }
-        let signature = &shown[..signature.len().min(CHANNELS_MAX)];
-        let mut parts = [Change::NONE; BLOCKS];
-        for (row, gradient) in signature.iter().zip(&self.gradient) {
-            let products = row.iter().zip(gradient).map(|(s, gradient)| s * gradient);
-            let with = parts.iter_mut().zip(products);
-            with.for_each(|(part, product)| part.b += product);
-        }
-        // What each block of the signature is expected to show in the silent channel.
-        let mut at_silent = [[0.0; BLOCKS]; BLOCKS];
-        let laws = self.precision.iter().zip(&self.lower);
-        for (direction, (precision, lower)) in self.directions.iter().zip(laws) {
-            let along = along(&direction.vector, signature);
-            let later = product(lower, &along);
-            for ((part, s), later) in parts.iter_mut().zip(along).zip(later) {
-                part.a += 2.0 * s * later;
-            }
-            let Some(silent) = silent else { continue };
-            let share = direction.vector[silent];
-            for ((shows, row), s) in at_silent.iter_mut().zip(precision).zip(along) {
-                let shows = shows.iter_mut().zip(row);
-                shows.for_each(|(sum, p)| *sum += share * p * s);
-            }
-        }
-        let (mut so_far, mut shows) = (Change::NONE, [0.0; BLOCKS]);
-        let mut out = [Change::NONE; BLOCKS];
-        for first in (0..BLOCKS).rev() {
-            (so_far.b, so_far.a) = (so_far.b + parts[first].b, so_far.a + parts[first].a);
-            out[first] = so_far;
-            if let Some(silent) = silent {
-                let more = shows.iter_mut().zip(at_silent[first]);
-                more.for_each(|(sum, more)| *sum += more);
-                let known = product(&self.own_inverse[silent][0], &shows);
-                out[first].b -= dot(&known, &self.gradient[silent]);
-                out[first].a -= dot(&known, &shows);
-            }
-        }
-        out
+        let signature = self.masked(channel, signature);
+        let b = sums_from(by_block(&signature, &self.gradient[channel]));
+        let a = self.own_square(channel, &signature);
+        std::array::from_fn(|first| Change {
+            b: b[first],
+            a: a[first],
+        })
     }
 
     /// `P s` of a signature, by channel. Its product with another one says how alike both are.
@@ -359,32 +306,42 @@ impl Law {
     /// less is their product if they say nothing.
     #[must_use]
     pub fn hidden(&self, channel: usize, first: usize, [one, other]: [&Row; 2]) -> f64 {
-        -dot(&self.silence(channel, first, one), other)
+        let [one, other] = [one, other].map(|row| product(&self.own_whitening[channel], row));
+        sums_from(by_block(&one, &other))[first]
     }
 
     /// What a channel whose readings say nothing from `first` on adds to a signature that is
     /// `weighed`, so that the signature says nothing of these readings either.
     #[must_use]
     pub fn silence(&self, channel: usize, first: usize, weighed: &Row) -> Row {
-        let mut gradient = *weighed;
-        gradient[..first].fill(0.0);
-        product(&self.own_inverse[channel][first], &gradient).map(|value| -value)
+        let whitening = &self.own_whitening[channel];
+        let mut whitened = product(whitening, weighed);
+        whitened[..first].fill(0.0);
+        whitening.map(|row| -dot(&row, &whitened))
     }
 
-    /// By how much the square lessens if a channel's readings from `first` on say nothing; the
-    /// blocks from there are expected at `z - deviation`.
+    /// By how much the square lessens if a channel's readings from each block on say nothing.
     #[must_use]
-    pub fn deviation(&self, channel: usize, first: usize) -> (f64, Row) {
-        let mut gradient = self.gradient[channel];
-        gradient[..first].fill(0.0);
-        let deviation = product(&self.own_inverse[channel][first], &gradient);
-        (dot(&gradient, &deviation), deviation)
+    pub fn silenced(&self, channel: usize) -> Row {
+        let whitened = product(&self.own_whitening[channel], &self.gradient[channel]);
+        sums_from(by_block(&whitened, &whitened))
     }
 
-    /// Square of a row of a channel under the law, given all other readings.
+    /// Square of a row of a channel under the law from each block on, given all other readings.
     #[must_use]
-    pub fn own_square(&self, channel: usize, row: &Row) -> f64 {
-        dot(row, &product(&self.own[channel], row))
+    pub fn own_square(&self, channel: usize, row: &Row) -> Row {
+        let later = product(&self.own_lower[channel], row);
+        sums_from(by_block(row, &later)).map(|half| 2.0 * half)
+    }
+
+    /// The same of the product of two rows.
+    #[must_use]
+    pub fn own_product(&self, channel: usize, one: &Row, other: &Row) -> Row {
+        let lower = &self.own_lower[channel];
+        let [later_one, later_other] = [one, other].map(|row| product(lower, row));
+        sums_from(std::array::from_fn(|block| {
+            one[block] * later_other[block] + other[block] * later_one[block]
+        }))
     }
 
     /// Natural logarithm of how much more likely the window is if its square were less by `less`

@@ -7,47 +7,37 @@ use super::channel::{Channel, Commands, Scales, Term};
 #[derive(Debug, Clone)]
 pub struct Predictor {
     terms: Vec<Term>,
-    /// Value of each under the commands of the last prediction.
-    values: Vec<f64>,
-    /// Of each channel its terms' places and weights.
-    weights: Vec<Vec<(usize, f64)>>,
+    /// Weight of each term in each channel.
+    weights: Vec<[f64; CHANNELS_MAX]>,
 }
 
 impl Predictor {
     /// Of these channels.
     #[must_use]
     pub fn new<'a>(channels: impl Iterator<Item = &'a Channel>) -> Self {
-        let mut terms: Vec<Term> = Vec::new();
-        let mut place = |term: &Term| match terms.iter().position(|other| other == term) {
-            Some(place) => place,
-            None => {
-                terms.push(*term);
-                terms.len() - 1
+        let (mut terms, mut weights) = (Vec::new(), Vec::new());
+        for (i, channel) in channels.enumerate().take(CHANNELS_MAX) {
+            for (term, weight) in channel.terms.iter().zip(&channel.weights) {
+                let known = terms.iter().position(|other| other == term);
+                let place = known.unwrap_or_else(|| {
+                    terms.push(*term);
+                    weights.push([0.0; CHANNELS_MAX]);
+                    terms.len() - 1
+                });
+                weights[place][i] += weight;
             }
-        };
-        let weights = channels.map(|channel| {
-            let terms = channel.terms.iter().zip(&channel.weights);
-            terms.map(|(term, weight)| (place(term), *weight)).collect()
-        });
-        let weights = weights.collect();
-        Self {
-            values: vec![0.0; terms.len()],
-            terms,
-            weights,
         }
+        Self { terms, weights }
     }
 
-    /// The values predicted from the newest commands; the same as [`Channel::predict`] gives.
-    pub fn predict(&mut self, commands: &Commands, scales: &Scales) -> [f64; CHANNELS_MAX] {
-        for (value, term) in self.values.iter_mut().zip(&self.terms) {
-            *value = term.value(commands, scales);
-        }
+    /// The values predicted from the newest commands.
+    #[must_use]
+    pub fn predict(&self, commands: &Commands, scales: &Scales) -> [f64; CHANNELS_MAX] {
         let mut predicted = [0.0; CHANNELS_MAX];
-        for (slot, weights) in predicted.iter_mut().zip(&self.weights) {
-            let parts = weights.iter();
-            *slot = parts
-                .map(|(place, weight)| weight * self.values[*place])
-                .sum();
+        for (term, weights) in self.terms.iter().zip(&self.weights) {
+            let value = term.value(commands, scales);
+            let sums = predicted.iter_mut().zip(weights);
+            sums.for_each(|(sum, weight)| *sum += weight * value);
         }
         predicted
     }

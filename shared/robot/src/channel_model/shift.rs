@@ -14,7 +14,7 @@ use crate::fault_table::SHOWN_MAX;
 const VARIANCE_MIN: f64 = 1e-300;
 
 /// What a window says of such a change.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Shift {
     /// By how much it lessens the square of the window.
     pub less: f64,
@@ -70,10 +70,7 @@ impl ShiftLaw {
             }
         }
         let Some(cholesky) = precision.cholesky() else {
-            return Shift {
-                less: 0.0,
-                penalty: 0.0,
-            };
+            return Shift::default();
         };
         let diagonal = cholesky.l_dirty().diagonal();
         let log_determinant: f64 = 2.0 * diagonal.map(f64::ln).sum();

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use nalgebra::DMatrix;
+use nalgebra::{Cholesky, DMatrix, Dyn};
 
 /// Blocks of a window.
 pub const BLOCKS: usize = 8;
@@ -12,11 +12,15 @@ pub type Row = [f64; BLOCKS];
 /// A square of such.
 pub type Square = [[f64; BLOCKS]; BLOCKS];
 
+/// Cholesky factor of the lower right part of a positive definite square, from `first` on.
+fn factor(square: &Square, first: usize) -> Option<Cholesky<f64, Dyn>> {
+    let n = BLOCKS - first;
+    DMatrix::from_fn(n, n, |i, j| square[first + i][first + j]).cholesky()
+}
+
 /// Inverse of the lower right part of a positive definite square, from `first` on.
 pub(super) fn inverse(square: &Square, first: usize) -> Option<Square> {
-    let n = BLOCKS - first;
-    let matrix = DMatrix::from_fn(n, n, |i, j| square[first + i][first + j]);
-    Some(lower_right(&matrix.cholesky()?.inverse(), first))
+    Some(lower_right(&factor(square, first)?.inverse(), first))
 }
 
 /// A square that is zero but for its lower right part, which begins with `first`.
@@ -39,18 +43,26 @@ pub(super) fn lower(square: &Square) -> Square {
     })
 }
 
-/// Transpose of the inverse of the Cholesky factor of the lower right part of a positive definite
-/// square.
+/// What makes values independent whose covariance is the lower right part of a square, the oldest
+/// first: transpose of the inverse of its Cholesky factor.
 pub(super) fn whitening(square: &Square, first: usize) -> Option<Square> {
     let n = BLOCKS - first;
-    let matrix = DMatrix::from_fn(n, n, |i, j| square[first + i][first + j]);
-    let factor = matrix.cholesky()?.l();
+    let factor = factor(square, first)?.l();
     let inverse = factor.solve_lower_triangular(&DMatrix::identity(n, n))?;
     Some(lower_right(&inverse.transpose(), first))
 }
 
-pub(super) fn masked(row: &Row, read: &Row) -> Row {
-    std::array::from_fn(|block| row[block] * read[block])
+/// The same, the newest first.
+pub(super) fn whitening_backwards(square: &Square, first: usize) -> Option<Square> {
+    let reversed = |square: &Square| -> Square {
+        let last = BLOCKS - 1;
+        std::array::from_fn(|i| std::array::from_fn(|j| square[last - i][last - j]))
+    };
+    let mut filled = *square;
+    for (i, row) in filled.iter_mut().enumerate().take(first) {
+        row[i] = 1.0;
+    }
+    Some(reversed(&whitening(&reversed(&filled), 0)?))
 }
 
 pub(super) fn along(vector: &[f64], rows: &[Row]) -> Row {
@@ -68,6 +80,19 @@ pub(super) fn product(square: &Square, row: &Row) -> Row {
         out.iter_mut().zip(from).for_each(|(a, b)| *a += value * b);
     }
     out
+}
+
+/// Sums of a row's values from each block on.
+pub(super) fn sums_from(mut row: Row) -> Row {
+    for block in (0..BLOCKS - 1).rev() {
+        row[block] += row[block + 1];
+    }
+    row
+}
+
+/// Products of two rows, block by block.
+pub(super) fn by_block(one: &Row, other: &Row) -> Row {
+    std::array::from_fn(|block| one[block] * other[block])
 }
 
 /// In four sums that do not wait for each other.

@@ -1,5 +1,8 @@
 //! The last few seconds of residuals and predictions, in blocks.
 
+mod context;
+mod sums;
+
 use vigil_checkpoint::{Checkpoint, CheckpointValue};
 
 use super::channel::{CLIP, Channel, Commands, Scales};
@@ -10,95 +13,35 @@ use super::prediction::Predictor;
 use super::{CHANNELS_MAX, DRIVES_MAX};
 use crate::description::INTERVAL_MIN_S;
 
-/// Longest delay that is looked for, in blocks.
-pub const DELAY_BLOCKS: usize = 4;
+use context::Context;
+use sums::Sums;
+
+/// Delays that are looked for, in blocks; one with a size of its own between them.
+pub const DELAYS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 /// Observations of a block at most.
 const BLOCK_MAX: usize = (BLOCK_S / INTERVAL_MIN_S + 0.5) as usize;
-const RING: usize = BLOCK_MAX * (BLOCKS + DELAY_BLOCKS);
 /// Motion after which a robot no longer speeds up, s.
 const MOVES_S: f64 = 0.5;
 /// Part of a drive's largest commanded speed that is added to show what an offset of it does.
 pub const OFFSET: f64 = 0.1;
-
-/// Time over which a run's own offset and gain are learned, s, and the part of a block's
-/// information that is new.
-const CONTEXT_S: f64 = 60.0;
+/// Part of a block's information on a run's own offset and gain that is new.
 const CONTEXT_SHARE: f64 = 0.5;
-/// So many deviations of a run's own offset and gain are no fault.
-const CONTEXT_MAX: f64 = 2.0;
-
-/// A channel's own offset and gain in a run.
-#[derive(Debug, Clone, Copy, CheckpointValue)]
-struct Context {
-    /// Sums of products of what they are multiplied by: of the offset, both, the gain.
-    information: [f64; 3],
-    /// Of these and the residuals.
-    vector: [f64; 2],
-    value: [f64; 2],
-}
-
-impl Context {
-    const NONE: Self = Self {
-        information: [0.0; 3],
-        vector: [0.0; 2],
-        value: [0.0; 2],
-    };
-
-    /// Takes a residual `z`, to which an offset of one adds `of[0]` and a gain `of[1]`.
-    fn learn(&mut self, of: [f64; 2], z: f64, weight: f64, dt_s: f64) {
-        let [of_offset, of_gain] = of;
-        let keep = (-dt_s / CONTEXT_S).exp();
-        let products = [
-            of_offset * of_offset,
-            of_offset * of_gain,
-            of_gain * of_gain,
-        ];
-        let information = self.information.iter_mut().zip(products);
-        information.for_each(|(sum, product)| *sum = keep * *sum + weight * product);
-        let vector = self.vector.iter_mut().zip(of);
-        vector.for_each(|(sum, of)| *sum = keep * *sum + weight * of * z);
-    }
-
-    /// The mean under a prior with these deviations.
-    fn solve(&mut self, sd: &[f64; 2]) {
-        let prior = sd.map(|sd| 1.0 / (sd * sd).max(1e-12));
-        let [a, b, c] = self.information;
-        let (a, c) = (a + prior[0], c + prior[1]);
-        let determinant = a * c - b * b;
-        let [x, y] = self.vector;
-        let mean = [(c * x - b * y) / determinant, (a * y - b * x) / determinant];
-        for ((slot, value), sd) in self.value.iter_mut().zip(mean).zip(sd) {
-            *slot = value.clamp(-CONTEXT_MAX * sd, CONTEXT_MAX * sd);
-        }
-    }
-}
 
 /// One observation.
 #[derive(Debug, Clone, Copy, CheckpointValue)]
 struct Moment {
-    /// False for what came before the record began.
-    is_there: bool,
-    /// True if the robot has moved for a while: at rest nothing jolts.
-    moves: bool,
     /// Whitened residuals.
     z: [Option<f64>; CHANNELS_MAX],
     /// One over the residuals' deviations.
     unit: [f64; CHANNELS_MAX],
     /// Predictions.
     predicted: [f64; CHANNELS_MAX],
-    /// What each drive's part of the predictions is, whitened, and an offset of it.
-    share: [[f64; CHANNELS_MAX]; DRIVES_MAX],
-    offset: [[f64; CHANNELS_MAX]; DRIVES_MAX],
 }
 
 const NOTHING: Moment = Moment {
-    is_there: false,
-    moves: false,
     z: [None; CHANNELS_MAX],
     unit: [0.0; CHANNELS_MAX],
     predicted: [0.0; CHANNELS_MAX],
-    share: [[0.0; CHANNELS_MAX]; DRIVES_MAX],
-    offset: [[0.0; CHANNELS_MAX]; DRIVES_MAX],
 };
 
 /// Channels, as bits, with which something may be wrong: what is usual of them is not learned.
@@ -125,6 +68,13 @@ pub struct Window {
     interval_s: f64,
     ring: Vec<Moment>,
     newest: usize,
+    /// Observations since the record began, at most as many as the ring holds.
+    count: usize,
+    /// What each observation of the newest block adds to its sums, in no order.
+    parts: Vec<Sums>,
+    newest_part: usize,
+    /// Sums of the blocks that end with each observation of the ring.
+    blocks: Vec<Sums>,
     context: [Context; CHANNELS_MAX],
     level: [Level; CHANNELS_MAX],
     /// Whitened residuals; none where a block holds no reading.
@@ -133,6 +83,8 @@ pub struct Window {
     pub unit: [Row; CHANNELS_MAX],
     /// Predictions over the residual's deviation.
     pub predicted: [Row; CHANNELS_MAX],
+    /// How the whitened residuals of each channel change if it is late by each of [`DELAYS`].
+    pub late: [[Row; CHANNELS_MAX]; DELAYS.len()],
     /// Each drive's part of the whitened predictions.
     pub share: [[Row; CHANNELS_MAX]; DRIVES_MAX],
     /// That of an offset of a tenth of each drive's largest speed.
@@ -149,19 +101,25 @@ impl Window {
     #[must_use]
     pub fn new(channels: Vec<(usize, Channel)>, scales: Scales, interval_s: f64) -> Self {
         let per_block = ((BLOCK_S / interval_s).round() as usize).clamp(1, BLOCK_MAX);
+        let length = per_block * BLOCKS;
         Self {
             predictor: Predictor::new(channels.iter().map(|(_, channel)| channel)),
             channels,
             scales,
             per_block,
             interval_s,
-            ring: vec![NOTHING; RING.min(per_block * (BLOCKS + DELAY_BLOCKS))],
+            ring: vec![NOTHING; length],
             newest: 0,
+            count: 0,
+            parts: vec![Sums::ZERO; per_block],
+            newest_part: 0,
+            blocks: vec![Sums::ZERO; length],
             context: [Context::NONE; CHANNELS_MAX],
             level: [Level::default(); CHANNELS_MAX],
             z: [[None; BLOCKS]; CHANNELS_MAX],
             unit: [[0.0; BLOCKS]; CHANNELS_MAX],
             predicted: [[0.0; BLOCKS]; CHANNELS_MAX],
+            late: [[[0.0; BLOCKS]; CHANNELS_MAX]; DELAYS.len()],
             share: [[[0.0; BLOCKS]; CHANNELS_MAX]; DRIVES_MAX],
             offset: [[[0.0; BLOCKS]; CHANNELS_MAX]; DRIVES_MAX],
             roughness: [(0.0, 0); CHANNELS_MAX],
@@ -196,14 +154,21 @@ impl Window {
 
     /// Begins a new record of the same run.
     pub fn clear(&mut self) {
-        for moment in &mut self.ring {
-            moment.is_there = false;
+        self.count = 0;
+        self.parts.fill(Sums::ZERO);
+        self.blocks.fill(Sums::ZERO);
+    }
+
+    /// Place in the ring of the observation so many before the newest.
+    fn place(&self, lag: usize) -> usize {
+        match self.newest.checked_sub(lag) {
+            Some(place) => place,
+            None => self.newest + self.ring.len() - lag,
         }
     }
 
-    fn ago(&self, lag: usize) -> &Moment {
-        let length = self.ring.len();
-        &self.ring[(self.newest + length - lag % length) % length]
+    fn ago(&self, lag: usize) -> Option<&Moment> {
+        (lag < self.count).then(|| &self.ring[self.place(lag)])
     }
 
     /// Takes the newest observation of `history`; deviations count `widening` times as much.
@@ -215,29 +180,24 @@ impl Window {
     ) {
         let Some(now) = history.ago(0) else { return };
         self.learn_context(held.context, now.dt_s);
-        self.newest = (self.newest + 1) % self.ring.len();
-        let moment_before = match self.ago(1) {
-            before if before.is_there => *before,
-            _ => NOTHING,
-        };
-        let (was_there, last) = (moment_before.is_there, moment_before.predicted);
+        let before = self.ago(0).copied();
         let mut moment = NOTHING;
-        moment.is_there = true;
-        moment.moves = now.moving && now.moving_s >= MOVES_S;
         let of_commands = self.predictor.predict(commands, &self.scales);
         for (i, (place, channel)) in self.channels.iter().enumerate() {
             let apart = now.values[*place].map(|value| value - of_commands[i]);
             let apart = apart.filter(|_| channel.drifts);
             let predicted = of_commands[i] + self.level[i].advance(apart, now.dt_s);
-            let before = if was_there { last[i] } else { predicted };
-            let basis = Channel::basis(&now.command, &self.scales, predicted, before);
+            let predicted_before = before.map_or(predicted, |before| before.predicted[i]);
+            let basis = Channel::basis(&now.command, &self.scales, predicted, predicted_before);
             let variance = match channel.drifts {
                 true => channel.variance_at(basis) * self.level[i].variance(),
                 false => channel.variance_at(basis),
             };
             let unit = 1.0 / (widening * variance.sqrt());
             // A single reading may be a glitch; what the one before confirms is none.
-            let last = moment_before.z[i].unwrap_or(0.0) * unit / moment_before.unit[i].max(1e-300);
+            let last = before.map_or(0.0, |before| {
+                before.z[i].unwrap_or(0.0) * unit / before.unit[i].max(1e-300)
+            });
             let (low, high) = (last.min(0.0) - CLIP, last.max(0.0) + CLIP);
             let z = now.values[*place].map(|value| ((value - predicted) * unit).clamp(low, high));
             (moment.predicted[i], moment.unit[i], moment.z[i]) = (predicted, unit, z);
@@ -245,6 +205,60 @@ impl Window {
                 self.level[i].take(apart, CLIP / unit, now.dt_s);
             }
         }
+        self.newest = (self.newest + 1) % self.ring.len();
+        self.count = (self.count + 1).min(self.ring.len());
+        let newest = self.newest;
+        self.ring[newest] = moment;
+        // At rest nothing jolts.
+        let moves = now.moving && now.moving_s >= MOVES_S;
+        let mut sums = self.sums(before.as_ref().filter(|_| moves));
+        self.add_drives(&mut sums, commands, &of_commands);
+        self.newest_part = (self.newest_part + 1) % self.per_block;
+        self.parts[self.newest_part] = sums;
+        let (channels, drives) = (self.channels.len(), self.drives());
+        let block = &mut self.blocks[newest];
+        *block = Sums::ZERO;
+        for part in &self.parts {
+            block.add(part, channels, drives);
+        }
+        self.average();
+    }
+
+    /// What the newest observation adds to the sums of its block; `before`: the one before it, if
+    /// the change since then is one of a healthy robot's noise.
+    fn sums(&self, before: Option<&Moment>) -> Sums {
+        let (mut sums, moment) = (Sums::ZERO, &self.ring[self.newest]);
+        let then = DELAYS.map(|blocks| {
+            let lag = (blocks * self.per_block as f64).round().max(1.0) as usize;
+            self.ago(lag).map(|moment| &moment.predicted)
+        });
+        for i in 0..self.channels.len() {
+            let Some(z) = moment.z[i] else { continue };
+            let (unit, predicted) = (moment.unit[i], moment.predicted[i]);
+            sums.count[i] = 1.0;
+            (sums.z[i], sums.unit[i], sums.predicted[i]) = (z, unit, predicted * unit);
+            for (late, then) in sums.late.iter_mut().zip(then) {
+                late[i] = then.map_or(0.0, |then| (then[i] - predicted) * unit);
+            }
+            let last = before.and_then(|before| Some((before.z[i]?, before.predicted[i])));
+            if let Some((z_last, predicted_last)) = last {
+                let of_prediction = (predicted - predicted_last) * unit;
+                let square = |x: f64| 0.5 * (x * x).min(4.0 * CLIP * CLIP);
+                sums.changes[i] = 1.0;
+                (sums.rough[i], sums.moved[i]) = (square(z - z_last), square(of_prediction));
+            }
+        }
+        sums
+    }
+
+    /// Adds what the drives' parts of the newest observation are; `of_commands`: the predictions of
+    /// all channels, without their levels.
+    fn add_drives(
+        &mut self,
+        sums: &mut Sums,
+        commands: &Commands,
+        of_commands: &[f64; CHANNELS_MAX],
+    ) {
         for d in 0..self.drives() {
             let (drive, speed) = (&self.scales.drives[d], self.scales.speeds[d]);
             let without = commands.map(|command| drive.without(&command));
@@ -253,88 +267,66 @@ impl Window {
             });
             let without = self.predictor.predict(&without, &self.scales);
             let more = self.predictor.predict(&more, &self.scales);
-            for i in 0..self.channels.len() {
-                moment.share[d][i] = (of_commands[i] - without[i]) * moment.unit[i];
-                moment.offset[d][i] = (more[i] - of_commands[i]) * moment.unit[i];
+            // Zero where nothing was measured.
+            for (i, unit) in sums.unit.iter().enumerate().take(self.channels.len()) {
+                sums.share[d][i] = (of_commands[i] - without[i]) * unit;
+                sums.offset[d][i] = (more[i] - of_commands[i]) * unit;
             }
         }
-        let newest = self.newest;
-        self.ring[newest] = moment;
-        self.sum_up();
     }
 
     /// The observation that leaves the window tells the run's own offset and gain.
     fn learn_context(&mut self, held: u64, dt_s: f64) {
-        let leaving = *self.ago(self.per_block * BLOCKS - 1);
+        let Some(leaving) = self.ago(self.per_block * BLOCKS - 1).copied() else {
+            return;
+        };
         let weight = CONTEXT_SHARE / self.per_block as f64;
         for (i, (_, channel)) in self.channels.iter().enumerate() {
-            let context = &mut self.context[i];
-            if held >> i & 1 == 1 || !leaving.is_there {
+            let Some(z) = leaving.z[i].filter(|_| held >> i & 1 == 0) else {
                 continue;
-            }
-            if let Some(z) = leaving.z[i] {
-                let of_gain = leaving.predicted[i] * leaving.unit[i];
-                context.learn([leaving.unit[i], of_gain], z, weight, dt_s);
-                context.solve(&channel.context_sd);
-            }
+            };
+            let of_gain = leaving.predicted[i] * leaving.unit[i];
+            let context = &mut self.context[i];
+            context.learn([leaving.unit[i], of_gain], z, weight, dt_s);
+            context.solve(&channel.context_sd);
         }
     }
 
-    fn sum_up(&mut self) {
+    /// Fills the rows with the means of the blocks.
+    fn average(&mut self) {
         let (n, drives) = (self.channels.len(), self.drives());
-        for i in 0..n {
-            self.roughness[i] = (0.0, 0);
-            self.newest_roughness[i] = [(0.0, 0); 2];
-        }
+        // What was not measured counts as expected: of a few readings a mean is no better.
+        let part = 1.0 / self.per_block as f64;
+        self.roughness = [(0.0, 0); CHANNELS_MAX];
+        self.newest_roughness = [[(0.0, 0); 2]; CHANNELS_MAX];
         for block in 0..BLOCKS {
-            let from = (BLOCKS - 1 - block) * self.per_block;
-            let mut sums = NOTHING;
-            let mut z = [None; CHANNELS_MAX];
-            for lag in from..from + self.per_block {
-                let length = self.ring.len();
-                let at = (self.newest + length - lag) % length;
-                let older = &self.ring[(at + length - 1) % length];
-                let moment = &self.ring[at];
-                if !moment.is_there {
-                    continue;
-                }
-                for (i, sum) in z.iter_mut().enumerate().take(n) {
-                    let Some(value) = moment.z[i] else { continue };
-                    let [offset, gain] = self.context[i].value;
-                    let expected = moment.unit[i] * (offset + gain * moment.predicted[i]);
-                    *sum = Some(sum.unwrap_or(0.0) + value - expected);
-                    sums.unit[i] += moment.unit[i];
-                    // A whole sensor reads this run's own offset and gain as well.
-                    sums.predicted[i] += moment.predicted[i] * moment.unit[i] + expected;
-                    for d in 0..drives {
-                        sums.share[d][i] += (1.0 + gain) * moment.share[d][i];
-                        sums.offset[d][i] += (1.0 + gain) * moment.offset[d][i];
-                    }
-                    let before = older.z[i].filter(|_| older.is_there && moment.moves);
-                    let Some(before) = before else { continue };
-                    let of_prediction = (moment.predicted[i] - older.predicted[i]) * moment.unit[i];
-                    let squares = [value - before, of_prediction]
-                        .map(|x| 0.5 * (x * x).min(4.0 * CLIP * CLIP));
-                    self.roughness[i].0 += squares[0];
-                    self.roughness[i].1 += 1;
-                    if block + 2 >= BLOCKS {
-                        let newest = self.newest_roughness[i].iter_mut();
-                        newest.zip(squares).for_each(|(sum, square)| {
-                            sum.0 += square;
-                            sum.1 += 1;
-                        });
-                    }
-                }
-            }
-            // What was not measured counts as expected: of a few readings a mean is no better.
-            let part = 1.0 / self.per_block as f64;
-            for (i, sum) in z.iter().enumerate().take(n) {
-                self.z[i][block] = sum.map(|sum: f64| part * sum);
+            let sums = &self.blocks[self.place((BLOCKS - 1 - block) * self.per_block)];
+            for i in 0..n {
+                let [offset, gain] = self.context[i].value;
+                let expected = offset * sums.unit[i] + gain * sums.predicted[i];
+                let z = part * (sums.z[i] - expected);
+                self.z[i][block] = (sums.count[i] > 0.0).then_some(z);
                 self.unit[i][block] = part * sums.unit[i];
-                self.predicted[i][block] = part * sums.predicted[i];
+                // A whole sensor reads this run's own offset and gain as well.
+                self.predicted[i][block] = part * (sums.predicted[i] + expected);
+                for (row, late) in self.late.iter_mut().zip(&sums.late) {
+                    row[i][block] = part * late[i];
+                }
+                let gain = part * (1.0 + gain);
                 for d in 0..drives {
-                    self.share[d][i][block] = part * sums.share[d][i];
-                    self.offset[d][i][block] = part * sums.offset[d][i];
+                    self.share[d][i][block] = gain * sums.share[d][i];
+                    self.offset[d][i][block] = gain * sums.offset[d][i];
+                }
+                let changes = sums.changes[i] as usize;
+                let add = |(sum, count): &mut (f64, usize), square: f64| {
+                    *sum += square;
+                    *count += changes;
+                };
+                add(&mut self.roughness[i], sums.rough[i]);
+                if block + 2 >= BLOCKS {
+                    let [read, predicted] = &mut self.newest_roughness[i];
+                    add(read, sums.rough[i]);
+                    add(predicted, sums.moved[i]);
                 }
             }
         }
@@ -347,26 +339,6 @@ impl Window {
     /// Newest blocks that the record fills.
     #[must_use]
     pub fn whole_blocks(&self) -> usize {
-        let there = (0..BLOCKS * self.per_block).take_while(|&lag| self.ago(lag).is_there);
-        there.count() / self.per_block
-    }
-
-    /// How the whitened residuals of a channel change if it is late by so many blocks, halves
-    /// included.
-    #[must_use]
-    pub fn delayed(&self, channel: usize, blocks: f64) -> Row {
-        let part = 1.0 / self.per_block as f64;
-        let late = (blocks * self.per_block as f64).round().max(1.0) as usize;
-        std::array::from_fn(|block| {
-            let from = (BLOCKS - 1 - block) * self.per_block;
-            let mut sum = 0.0;
-            for lag in from..from + self.per_block {
-                let (now, then) = (self.ago(lag), self.ago(lag + late));
-                if now.is_there && then.is_there && now.z[channel].is_some() {
-                    sum += (then.predicted[channel] - now.predicted[channel]) * now.unit[channel];
-                }
-            }
-            part * sum
-        })
+        self.count / self.per_block
     }
 }

@@ -52,7 +52,9 @@ fn the_law_says_what_its_whole_covariance_says() {
             let square = z_there.dot(&(of_there.cholesky().unwrap().inverse() * &z_there));
             near(law.parts()[..first].iter().sum(), square);
         }
-        for (first, Change { b, a }) in law.joint_change(&rows(&s), None).into_iter().enumerate() {
+        let signature = law.signature(&rows(&s));
+        let changes = law.joint_change(&signature, None);
+        for (first, Change { b, a }) in changes.into_iter().enumerate() {
             let s = from(&s, first);
             near(b, s.dot(&(&precision * &z)));
             near(a, s.dot(&(&precision * &s)));
@@ -61,7 +63,7 @@ fn the_law_says_what_its_whole_covariance_says() {
         let product: f64 = rows(&z).iter().zip(&weighed).map(|(a, b)| dot(a, b)).sum();
         near(product, s.dot(&(&precision * &z)));
         // Without the first channel: under the law of the others alone.
-        let changes = law.joint_change(&rows(&without_first(&s)), Some(0));
+        let changes = law.joint_change(&signature.without(&law, 0), Some(0));
         let others = 2 * BLOCKS;
         let of_others = covariance
             .view((BLOCKS, BLOCKS), (others, others))
@@ -98,7 +100,8 @@ fn the_law_says_of_a_channel_what_its_whole_covariance_says() {
         let (z, s) = (draw(), draw());
         law.take(&rows(&z).iter().map(|row| row.map(Some)).collect::<Vec<_>>());
         for channel in 0..3 {
-            let changes = law.change(channel, &rows(&s)[channel]);
+            let own = rows(&s)[channel];
+            let changes = law.change(channel, &own);
             for (first, Change { b, a }) in changes.into_iter().enumerate() {
                 let (from, to) = (channel * BLOCKS + first, (channel + 1) * BLOCKS);
                 let alone = DVector::from_fn(3 * BLOCKS, |i, _| match (from..to).contains(&i) {
@@ -107,6 +110,13 @@ fn the_law_says_of_a_channel_what_its_whole_covariance_says() {
                 });
                 near(b, alone.dot(&(&precision * &z)));
                 near(a, alone.dot(&(&precision * &alone)));
+                near(law.own_square(channel, &own)[first], a);
+                let other = DVector::from_fn(3 * BLOCKS, |i, _| match (from..to).contains(&i) {
+                    true => z[i],
+                    false => 0.0,
+                });
+                let product = law.own_product(channel, &own, &rows(&z)[channel]);
+                near(product[first], alone.dot(&(&precision * &other)));
                 // Without these readings: the square of the others under their own law.
                 let rest: Vec<usize> = (0..3 * BLOCKS)
                     .filter(|i| !(from..to).contains(i))
@@ -116,7 +126,7 @@ fn the_law_says_of_a_channel_what_its_whole_covariance_says() {
                 });
                 let z_rest = DVector::from_fn(rest.len(), |i, _| z[rest[i]]);
                 let without = z_rest.dot(&(of_rest.cholesky().unwrap().inverse() * &z_rest));
-                near(law.square() - law.deviation(channel, first).0, without);
+                near(law.square() - law.silenced(channel)[first], without);
             }
         }
     }
@@ -134,13 +144,6 @@ fn dot(a: &Row, b: &Row) -> f64 {
 fn from(values: &DVector<f64>, first: usize) -> DVector<f64> {
     let begins = |i: usize| i % BLOCKS >= first;
     DVector::from_fn(values.len(), |i, _| if begins(i) { values[i] } else { 0.0 })
-}
-
-fn without_first(values: &DVector<f64>) -> DVector<f64> {
-    DVector::from_fn(
-        values.len(),
-        |i, _| if i < BLOCKS { 0.0 } else { values[i] },
-    )
 }
 
 #[test]
@@ -205,6 +208,35 @@ fn what_no_fault_explains_is_weighed_by_the_density_of_wider_laws() {
             assert!((law.log_ratio_unknown(square, &before) - all.ln()).abs() < 1e-9);
         }
     }
+}
+
+#[test]
+fn likelihoods_of_several_changes_are_those_of_each() {
+    let (mut law, _) = law();
+    for size in [0.1, 4.0, 1e3] {
+        law.take(&[[Some(size); BLOCKS], [Some(-size); BLOCKS], [None; BLOCKS]]);
+        let square = law.square();
+        let less = [-1e3, -square, 0.0, 0.3 * square, 0.98 * square, square];
+        let density = [1.0, 0.3, 1e-4, 1.0, 1e-9, 0.01];
+        let found = law.likelihoods(less, density);
+        let each: Vec<f64> = less
+            .iter()
+            .zip(density)
+            .map(|(less, density)| law.log_ratio(*less, -f64::ln(density)))
+            .collect();
+        let highest = each.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let sum: f64 = each.iter().map(|one| (one - highest).exp()).sum();
+        let mean = highest + (sum / 6.0).ln();
+        assert!((found.log_mean() - mean).abs() < 1e-9 * (1.0 + mean.abs()));
+        assert_eq!(each[found.likeliest()], highest);
+    }
+    // What is no number says nothing.
+    let found = law.likelihoods([f64::NAN, 1.0], [1.0; 2]);
+    assert!((found.log_mean() - (law.log_ratio(1.0, 0.0) - f64::ln(2.0))).abs() < 1e-9);
+    assert_eq!(
+        law.likelihoods([f64::NAN], [1.0]).log_mean(),
+        f64::NEG_INFINITY
+    );
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::{Bank, JOINT_ONSETS, Weighed};
 use crate::channel_model::fault_kind::{DECLARED_KINDS, FaultKind};
 use crate::channel_model::law::BLOCKS;
+use crate::channel_model::shift::Shift;
 
 impl Bank {
     pub(super) fn weigh_declared(&mut self, fault: usize) {
@@ -34,13 +35,13 @@ impl Bank {
             return Weighed::NONE;
         };
         let unit = |channel: usize| (self.window.unit[channel], self.bias_sd(channel));
-        Weighed::over(JOINT_ONSETS.map(|first| {
-            let found = shift.weigh(self.law(), first, unit);
-            Weighed {
-                log_ratio: self.law().log_ratio(found.less, found.penalty),
-                age_s: self.window.block_s() * self.law().blocks(first) as f64,
-                ..Weighed::NONE
-            }
-        }))
+        let law = self.law();
+        let mut shifts = [Shift::default(); BLOCKS];
+        for first in JOINT_ONSETS {
+            shifts[first] = shift.weigh(law, first, unit);
+        }
+        let density = |first: usize| (-shifts[first].penalty).exp();
+        self.begun(JOINT_ONSETS, |first| shifts[first].less, density)
+            .0
     }
 }

@@ -1,13 +1,11 @@
 //! The faults that are compared, and what each changes of a window.
 
 use vigil_robot::Description;
-use vigil_robot::channel_model::bank::{
-    DELAYS, DRIVE_ONSETS, HELD, JOINT_ONSETS, KINDS_MAX, ONSETS,
-};
+use vigil_robot::channel_model::bank::{DRIVE_ONSETS, HELD, JOINT_ONSETS, KINDS_MAX, ONSETS};
 use vigil_robot::channel_model::fault_kind::{FaultKind, GAIN_SD, SHARE_SD, bias_sd};
 use vigil_robot::channel_model::law::{BLOCK_S, BLOCKS, Law, Row};
 use vigil_robot::channel_model::model::Class;
-use vigil_robot::channel_model::window::OFFSET;
+use vigil_robot::channel_model::window::{DELAYS, OFFSET};
 use vigil_robot::channel_model::{
     Component, Model, Places, Quantity, Target, components, drives, targets,
 };

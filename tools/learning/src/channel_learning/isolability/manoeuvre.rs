@@ -3,7 +3,7 @@
 use vigil_robot::channel_model::channel::commands;
 use vigil_robot::channel_model::law::{BLOCK_S, BLOCKS, Law};
 use vigil_robot::channel_model::observation::smoothed;
-use vigil_robot::channel_model::window::{DELAY_BLOCKS, Suspects, Window};
+use vigil_robot::channel_model::window::{Suspects, Window};
 use vigil_robot::channel_model::{AXES, History, Model, Observation, Range, Scales};
 
 use super::comparison::Products;
@@ -69,7 +69,8 @@ impl Manoeuvre {
         let mut window = Window::new(used, scales.clone(), model.interval_s);
         let mut history = History::default();
         let driven = self.blocks * window.per_block();
-        let total = (BLOCKS + DELAY_BLOCKS) * window.per_block();
+        // At rest for long enough for what a late sensor would read.
+        let total = 2 * BLOCKS * window.per_block();
         let mut last = Observation::default();
         for step in 0..total + driven {
             let moving = step >= total;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use vigil_robot::Description;
 use vigil_robot::channel_model::law::{BLOCK_S, BLOCKS, Law, Row};
-use vigil_robot::channel_model::window::Window;
+use vigil_robot::channel_model::window::{DELAYS, Window};
 use vigil_robot::channel_model::{AXES, History, Observation, Quantity, Target, targets};
 
 use super::super::record::Record;
@@ -14,7 +14,9 @@ use super::Task;
 /// Windows that are looked at, at most.
 const WINDOWS_MAX: usize = 400;
 /// Lateness of a delayed sensor, s.
-pub(super) const DELAY_S: f64 = 1.0;
+pub(super) const DELAY_S: f64 = DELAYS[DELAY] * BLOCK_S;
+/// Its place among [`DELAYS`].
+const DELAY: usize = 2;
 
 /// Where in the motion of a log something is.
 #[derive(Debug, Clone, Copy, Default)]
@@ -60,7 +62,6 @@ impl Snapshot {
         let n = law.values() / BLOCKS;
         law.take(&window.z[..n]);
         let drives = 0..window.drives();
-        let late = DELAY_S / window.block_s();
         let residual = |i: usize| {
             let [older, newer] = [BLOCKS - 2, BLOCKS - 1];
             let unit = window.unit[i][older] + window.unit[i][newer];
@@ -74,7 +75,7 @@ impl Snapshot {
             z: (0..n).map(|i| *law.row(i)).collect(),
             unit: window.unit[..n].to_vec(),
             predicted: window.predicted[..n].to_vec(),
-            late: (0..n).map(|i| window.delayed(i, late)).collect(),
+            late: window.late[DELAY][..n].to_vec(),
             share: drives
                 .clone()
                 .map(|d| window.share[d][..n].to_vec())

@@ -1,0 +1,101 @@
+//! What a window says of a change of several channels at once.
+
+use super::{BLOCKS, Change, Law, Row};
+use crate::channel_model::CHANNELS_MAX;
+use crate::channel_model::square::{along, by_block, dot, product, sums_from};
+
+/// A change of several channels, where they were measured.
+#[derive(Debug, Clone)]
+pub struct JointSignature {
+    rows: [Row; CHANNELS_MAX],
+    /// Along each principal direction.
+    along: [Row; CHANNELS_MAX],
+}
+
+impl JointSignature {
+    /// The same, under the law that it was made for, without a change of this channel.
+    #[must_use]
+    pub fn without(mut self, law: &Law, channel: usize) -> Self {
+        let row = std::mem::take(&mut self.rows[channel]);
+        for (direction, along) in law.directions.iter().zip(&mut self.along) {
+            let share = direction.vector[channel];
+            let values = along.iter_mut().zip(row);
+            values.for_each(|(sum, value)| *sum -= share * value);
+        }
+        self
+    }
+}
+
+impl Law {
+    /// A change of the channels, by channel.
+    #[must_use]
+    pub fn signature(&self, rows: &[Row]) -> JointSignature {
+        let mut signature = JointSignature {
+            rows: [[0.0; BLOCKS]; CHANNELS_MAX],
+            along: [[0.0; BLOCKS]; CHANNELS_MAX],
+        };
+        let slots = signature.rows.iter_mut().zip(rows).zip(&self.read);
+        slots.for_each(|((slot, row), read)| *slot = by_block(row, read));
+        for (slot, direction) in signature.along.iter_mut().zip(&self.directions) {
+            *slot = along(&direction.vector, &signature.rows);
+        }
+        signature
+    }
+
+    /// What a window says of a change of several channels at once, from each block on, where the
+    /// readings of one channel may say nothing.
+    #[must_use]
+    pub fn joint_change(
+        &self,
+        signature: &JointSignature,
+        silent: Option<usize>,
+    ) -> [Change; BLOCKS] {
+        let (mut b, mut a) = ([0.0; BLOCKS], [0.0; BLOCKS]);
+        for (row, gradient) in signature.rows.iter().zip(&self.gradient) {
+            let products = b.iter_mut().zip(by_block(row, gradient));
+            products.for_each(|(sum, product)| *sum += product);
+        }
+        for (along, lower) in signature.along.iter().zip(&self.lower) {
+            let later = a.iter_mut().zip(by_block(along, &product(lower, along)));
+            later.for_each(|(sum, product)| *sum += 2.0 * product);
+        }
+        let (b, a) = (sums_from(b), sums_from(a));
+        let mut changes: [Change; BLOCKS] = std::array::from_fn(|first| Change {
+            b: b[first],
+            a: a[first],
+        });
+        if let Some(silent) = silent {
+            self.silence_change(&mut changes, signature, silent);
+        }
+        changes
+    }
+
+    /// Takes what the readings of a channel say out of the change.
+    fn silence_change(
+        &self,
+        changes: &mut [Change; BLOCKS],
+        signature: &JointSignature,
+        silent: usize,
+    ) {
+        // What each block of the signature is expected to show in the channel.
+        let mut shown = [[0.0; BLOCKS]; BLOCKS];
+        let laws = self.directions.iter().zip(&self.precision);
+        for ((direction, precision), along) in laws.zip(&signature.along) {
+            let share = direction.vector[silent];
+            for ((shown, row), s) in shown.iter_mut().zip(precision).zip(along) {
+                let values = shown.iter_mut().zip(row);
+                values.for_each(|(sum, p)| *sum += share * s * p);
+            }
+        }
+        let whitening = &self.own_whitening[silent];
+        let gradient = product(whitening, &self.gradient[silent]);
+        let mut whole = [0.0; BLOCKS];
+        for (change, shown) in changes.iter_mut().zip(shown).rev() {
+            let more = whole.iter_mut().zip(shown);
+            more.for_each(|(sum, more)| *sum += more);
+            let whitened = product(whitening, &whole);
+            change.b -= dot(&whitened, &gradient);
+            change.a -= dot(&whitened, &whitened);
+        }
+    }
+}
