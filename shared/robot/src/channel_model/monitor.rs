@@ -9,6 +9,7 @@
 //! by as much.
 
 mod explanation;
+mod shares;
 
 use vigil_checkpoint::Checkpoint;
 use vigil_inference::logspace::{log_add, log_sum_exp};
@@ -34,6 +35,7 @@ use crate::description::Description;
 use crate::learned::channels::Channels;
 use crate::learned::monitor::DetectionOutput;
 use crate::slot::{SLOTS, Slot};
+use shares::Shares;
 
 /// Fewest blocks of a window that say anything.
 const BLOCKS_MIN: usize = 2;
@@ -239,6 +241,9 @@ impl Monitor {
                 let Some(kind) = watched.part.kind(k) else {
                     continue;
                 };
+                if found.log_ratio <= IMPOSSIBLE {
+                    continue;
+                }
                 let log_odds = prior + found.log_ratio - (KINDS_MAX as f64).ln();
                 match Class::from_kind(kind) {
                     Some(class) => {
@@ -261,61 +266,55 @@ impl Monitor {
         let prior = component_prior(seen.count());
         let (raw, certain) = self.raw(prior);
         let n = self.watched.len() + 1;
-        let recorded = [Class::Signature as usize, Class::Turning as usize];
         let unknown = prior + self.bank.unknown();
         // Of what the window's means show, of what its noise shows, and of what is certain.
         let mut odds: Odds = [IMPOSSIBLE; COMPONENTS_MAX + 1];
         let mut odds_of_noise = certain;
         let (mut odds_unknown, mut unknown_noise) = (IMPOSSIBLE, IMPOSSIBLE);
-        for (class, tail) in self.tails.iter().enumerate() {
-            let mut all: Odds = [IMPOSSIBLE; COMPONENTS_MAX + 1];
-            for (slot, raw) in all.iter_mut().zip(&raw[..n]) {
-                *slot = raw[class];
-            }
-            if class == Class::Pair as usize {
-                // Where no second fault is looked for, it is that of the sensor alone.
-                let alone = self.classes[Class::Erratic as usize];
-                let pair = self.bank.pair();
-                self.classes[class] = pair.map_or(alone, |pair| prior + pair.log_ratio);
-                continue;
-            }
-            if class == Class::Unknown as usize {
-                self.classes[class] = unknown.max(IMPOSSIBLE);
-                odds_unknown = tempered(tail.as_ref(), unknown);
-                continue;
-            }
+        for class in Class::ALL {
+            let tail = self.tails[class as usize].as_ref();
+            let of_class = raw[..n].iter().map(|by_class| by_class[class as usize]);
             // Noise of several channels at once is of no component.
-            let of_none = match class == Class::Noise as usize {
-                true => prior + self.bank.unknown_noise(),
-                false => IMPOSSIBLE,
+            let of_none = match class {
+                Class::Pair => {
+                    // Where no second fault is looked for, it is that of the sensor alone.
+                    let alone = self.classes[Class::Erratic as usize];
+                    let pair = self.bank.pair();
+                    self.classes[class as usize] =
+                        pair.map_or(alone, |pair| prior + pair.log_ratio);
+                    continue;
+                }
+                Class::Unknown => {
+                    self.classes[class as usize] = unknown.max(IMPOSSIBLE);
+                    odds_unknown = tempered(tail, unknown);
+                    continue;
+                }
+                Class::Noise => prior + self.bank.unknown_noise(),
+                _ => IMPOSSIBLE,
             };
-            let total = log_add(log_sum_exp(&all), of_none).max(IMPOSSIBLE);
-            self.classes[class] = total;
-            let slope = tail.as_ref().map_or(1.0, |tail| tail.slope);
+            let mut shares = Shares::new(of_class.chain([of_none]));
+            let total = shares.total();
+            self.classes[class as usize] = total;
             // A fault of which there are recordings does occur.
-            let tempered = match recorded.contains(&class) {
-                true => tempered(tail.as_ref(), total) + RECORDED.ln(),
-                false => tempered(tail.as_ref(), total),
+            let tempered = match class {
+                Class::Signature | Class::Turning => tempered(tail, total) + RECORDED.ln(),
+                _ => tempered(tail, total),
             };
             // The likelihoods tell the components apart no better than health from faults.
-            let sharpened = all.map(|value| slope * (value - total));
-            let none = slope * (of_none - total);
-            let sharpened_total = log_add(log_sum_exp(&sharpened[..n]), none);
-            let slots = match class == Class::Noise as usize {
-                true => {
-                    unknown_noise = tempered + none - sharpened_total;
-                    &mut odds_of_noise
-                }
-                false => &mut odds,
-            };
-            for (slot, value) in slots.iter_mut().zip(sharpened).take(n) {
-                *slot = log_add(*slot, tempered + value - sharpened_total);
+            let slope = tail.map_or(1.0, |tail| tail.slope);
+            for (component, share) in shares.divide(slope, tempered) {
+                let slot = match class {
+                    Class::Noise if component == n => &mut unknown_noise,
+                    Class::Noise => &mut odds_of_noise[component],
+                    _ => &mut odds[component],
+                };
+                *slot = log_add(*slot, share);
             }
         }
         self.divide_declared(&raw[..n], &mut odds[..n]);
         let explained = self.explained_alone(prior, &raw);
         let pair = self.explain(prior, explained, (&mut odds[..n], &mut odds_unknown));
-        for (slot, value) in odds.iter_mut().zip(odds_of_noise) {
+        for (slot, value) in odds.iter_mut().zip(odds_of_noise).take(n) {
             *slot = log_add(*slot, value);
         }
         self.report_odds(&odds, log_add(odds_unknown, unknown_noise), pair);

@@ -30,14 +30,14 @@ impl Bank {
         let law = self.law();
         match kind {
             FaultKind::Stuck => self.stuck(share, own(Quantity::Current)),
-            FaultKind::Loss => self.lost(share),
+            FaultKind::Loss => self.lost(share, None),
             // Where nothing tells the wheel's rate, this is the same as a loss.
-            FaultKind::Slip => own(Quantity::WheelRate).map_or(Weighed::NONE, |rate| {
-                self.lost(&share.clone().without(law, rate))
-            }),
+            FaultKind::Slip => {
+                own(Quantity::WheelRate).map_or(Weighed::NONE, |rate| self.lost(share, Some(rate)))
+            }
             FaultKind::Offset => {
                 let offset = law.signature(&self.window.offset[drive][..n]);
-                let found = self.moved(&offset);
+                let found = self.moved(&offset, None);
                 Weighed {
                     size: OFFSET * found.size,
                     size_sd: OFFSET * found.size_sd,
@@ -58,7 +58,7 @@ impl Bank {
             (less, law.blocks(0) as f64 * ERRATIC.ln())
         });
         let changes = match current {
-            Some(current) => law.joint_change(&share.clone().without(law, current), Some(current)),
+            Some(current) => law.joint_change_beside(share, current),
             None => law.joint_change(share, None),
         };
         let less = |first: usize| free - 2.0 * changes[first].b - changes[first].a;
@@ -69,18 +69,18 @@ impl Bank {
         }
     }
 
-    /// A part of a share that is lost.
-    fn lost(&self, share: &JointSignature) -> Weighed {
-        let found = self.moved(share);
+    /// A part of a share that is lost, but for one channel.
+    fn lost(&self, share: &JointSignature, but: Option<usize>) -> Weighed {
+        let found = self.moved(share, but);
         Weighed {
             size: -found.size,
             ..found
         }
     }
 
-    /// A change of several channels.
-    fn moved(&self, signature: &JointSignature) -> Weighed {
-        let changes = self.law().joint_change(signature, None);
+    /// A change of several channels, but for one.
+    fn moved(&self, signature: &JointSignature, but: Option<usize>) -> Weighed {
+        let changes = self.law().joint_change(signature, but);
         self.sized(DRIVE_ONSETS, &changes, SHARE_SD)
     }
 }

@@ -12,20 +12,6 @@ pub struct JointSignature {
     along: [Row; CHANNELS_MAX],
 }
 
-impl JointSignature {
-    /// The same, under the law that it was made for, without a change of this channel.
-    #[must_use]
-    pub fn without(mut self, law: &Law, channel: usize) -> Self {
-        let row = std::mem::take(&mut self.rows[channel]);
-        for (direction, along) in law.directions.iter().zip(&mut self.along) {
-            let share = direction.vector[channel];
-            let values = along.iter_mut().zip(row);
-            values.for_each(|(sum, value)| *sum -= share * value);
-        }
-        self
-    }
-}
-
 impl Law {
     /// A change of the channels, by channel.
     #[must_use]
@@ -42,41 +28,43 @@ impl Law {
         signature
     }
 
-    /// What a window says of a change of several channels at once, from each block on, where the
-    /// readings of one channel may say nothing.
+    /// What a window says of a change of several channels at once, from each block on; `but`: a
+    /// channel that does not change.
     #[must_use]
-    pub fn joint_change(
-        &self,
-        signature: &JointSignature,
-        silent: Option<usize>,
-    ) -> [Change; BLOCKS] {
-        let (mut b, mut a) = ([0.0; BLOCKS], [0.0; BLOCKS]);
-        for (row, gradient) in signature.rows.iter().zip(&self.gradient) {
-            let products = b.iter_mut().zip(by_block(row, gradient));
-            products.for_each(|(sum, product)| *sum += product);
+    pub fn joint_change(&self, signature: &JointSignature, but: Option<usize>) -> [Change; BLOCKS] {
+        let mut b = [0.0; BLOCKS];
+        for (channel, row) in signature.rows.iter().enumerate().take(self.channels) {
+            if Some(channel) != but {
+                let products = b.iter_mut().zip(by_block(row, &self.gradient[channel]));
+                products.for_each(|(sum, product)| *sum += product);
+            }
         }
-        for (along, lower) in signature.along.iter().zip(&self.lower) {
-            let later = a.iter_mut().zip(by_block(along, &product(lower, along)));
+        let left_out = but.map(|channel| (channel, &signature.rows[channel]));
+        let mut a = [0.0; BLOCKS];
+        let laws = self.directions.iter().zip(&self.lower);
+        for ((direction, lower), along) in laws.zip(&signature.along) {
+            let along = left_out.map_or(*along, |(channel, row)| {
+                let share = direction.vector[channel];
+                std::array::from_fn(|block| along[block] - share * row[block])
+            });
+            let later = a.iter_mut().zip(by_block(&along, &product(lower, &along)));
             later.for_each(|(sum, product)| *sum += 2.0 * product);
         }
         let (b, a) = (sums_from(b), sums_from(a));
-        let mut changes: [Change; BLOCKS] = std::array::from_fn(|first| Change {
+        std::array::from_fn(|first| Change {
             b: b[first],
             a: a[first],
-        });
-        if let Some(silent) = silent {
-            self.silence_change(&mut changes, signature, silent);
-        }
-        changes
+        })
     }
 
-    /// Takes what the readings of a channel say out of the change.
-    fn silence_change(
+    /// The same where the readings of one channel say nothing.
+    #[must_use]
+    pub fn joint_change_beside(
         &self,
-        changes: &mut [Change; BLOCKS],
         signature: &JointSignature,
         silent: usize,
-    ) {
+    ) -> [Change; BLOCKS] {
+        let mut changes = self.joint_change(signature, None);
         // What each block of the signature is expected to show in the channel.
         let mut shown = [[0.0; BLOCKS]; BLOCKS];
         let laws = self.directions.iter().zip(&self.precision);
@@ -97,5 +85,6 @@ impl Law {
             change.b -= dot(&whitened, &gradient);
             change.a -= dot(&whitened, &whitened);
         }
+        changes
     }
 }
