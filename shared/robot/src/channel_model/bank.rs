@@ -112,6 +112,9 @@ pub struct Bank {
     declared: DeclaredFaults,
     first_declared: usize,
     silent_s: [f64; CHANNELS_MAX],
+    /// Deviation of a bias of each channel.
+    #[checkpoint(scratch)]
+    bias_sd: [f64; CHANNELS_MAX],
     weighed: [[Weighed; KINDS_MAX]; COMPONENTS_MAX],
     /// Component without whose channels the window is being weighed; none between two steps.
     #[checkpoint(scratch)]
@@ -140,6 +143,7 @@ impl Bank {
             declared,
             first_declared,
             silent_s: [0.0; CHANNELS_MAX],
+            bias_sd: [0.0; CHANNELS_MAX],
             weighed: [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX],
             left_out: None,
             pair: None,
@@ -250,11 +254,10 @@ impl Bank {
                 true => 0.0,
                 false => self.silent_s[channel] + dt_s,
             };
+            self.bias_sd[channel] = self.bias_sd(channel);
             self.weigh_sensor(channel);
         }
-        for drive in 0..self.drives.len() {
-            self.weigh_drive(drive);
-        }
+        self.weigh_drives();
         self.declared.take(&self.window, terms, dt_s);
         for fault in 0..self.declared.len() {
             self.weigh_declared(fault);

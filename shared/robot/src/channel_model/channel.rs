@@ -95,11 +95,23 @@ impl Scales {
         }
     }
 
-    /// Product of powers of a command's axes, each divided by its size.
-    fn product(&self, powers: &[u8; AXES], command: &[f64; AXES]) -> f64 {
-        let scaled = std::array::from_fn(|axis| command[axis] / self.axes[axis]);
-        product(powers, &scaled)
+    /// Commands with what terms are made of.
+    #[must_use]
+    pub fn told(&self, commands: &Commands) -> Told {
+        Told {
+            plain: *commands,
+            scaled: commands
+                .map(|command| std::array::from_fn(|axis| command[axis] / self.axes[axis])),
+        }
     }
+}
+
+/// The newest commands.
+#[derive(Debug, Clone)]
+pub struct Told {
+    plain: Commands,
+    /// Each axis divided by its learned size.
+    scaled: Commands,
 }
 
 impl Term {
@@ -130,37 +142,29 @@ impl Term {
         }
     }
 
-    /// Its value under a command.
+    /// Its value under commands.
     #[must_use]
-    fn of_command(&self, command: &[f64; AXES], scales: &Scales) -> f64 {
-        match self.of {
-            Regressor::Constant => 1.0,
-            Regressor::Command => scales.product(&self.powers, command),
-            Regressor::Lagged | Regressor::Smoothed => {
-                command[self.index.min(AXES - 1)] / scales.axes[self.index.min(AXES - 1)]
-            }
-            Regressor::Sense => {
-                let drive = scales.drives.get(self.index);
-                let speed = drive.map_or(0.0, |drive| drive.commanded(command));
-                let largest = scales.speeds.get(self.index).copied().unwrap_or(1.0);
-                (speed / (SENSE * largest)).tanh()
-            }
-        }
-    }
-
-    /// Its value under the newest commands.
-    #[must_use]
-    pub fn value(&self, commands: &Commands, scales: &Scales) -> f64 {
+    pub fn value(&self, told: &Told, scales: &Scales) -> f64 {
         let place = match self.of {
             Regressor::Smoothed => DEPTH + self.lag,
             _ => self.lag,
         };
-        let value = self.of_command(&commands[place.min(commands.len() - 1)], scales);
+        let place = place.min(told.plain.len() - 1);
+        let axis = self.index.min(AXES - 1);
         match self.of {
-            Regressor::Smoothed if !are_zero(&self.powers) => {
-                value * scales.product(&self.powers, &commands[0])
+            Regressor::Constant => 1.0,
+            Regressor::Command => product(&self.powers, &told.scaled[place]),
+            Regressor::Lagged => told.scaled[place][axis],
+            Regressor::Smoothed if are_zero(&self.powers) => told.scaled[place][axis],
+            Regressor::Smoothed => {
+                told.scaled[place][axis] * product(&self.powers, &told.scaled[0])
             }
-            _ => value,
+            Regressor::Sense => {
+                let drive = scales.drives.get(self.index);
+                let speed = drive.map_or(0.0, |drive| drive.commanded(&told.plain[place]));
+                let largest = scales.speeds.get(self.index).copied().unwrap_or(1.0);
+                (speed / (SENSE * largest)).tanh()
+            }
         }
     }
 }
@@ -213,15 +217,6 @@ pub fn commands(history: &History) -> Commands {
 }
 
 impl Channel {
-    /// The value predicted from the newest commands.
-    #[must_use]
-    pub fn predict(&self, commands: &Commands, scales: &Scales) -> f64 {
-        let terms = self.terms.iter().zip(&self.weights);
-        terms
-            .map(|(term, weight)| weight * term.value(commands, scales))
-            .sum()
-    }
-
     /// What [`Self::variance`] is multiplied by, with the prediction and the one before.
     #[must_use]
     pub fn basis(

@@ -353,6 +353,16 @@ impl Drive {
         self.speed.iter().zip(command).map(|(a, b)| a * b).sum()
     }
 
+    /// True if a change of its speed does to the robot what the same change of another one's does.
+    #[must_use]
+    pub fn moves_like(&self, other: &Self) -> bool {
+        let near = |a: &[f64; AXES], b: &[f64; AXES]| {
+            let mut pairs = a.iter().zip(b);
+            pairs.all(|(a, b)| (a - b).abs() <= 1e-9 * (a.abs() + b.abs()))
+        };
+        near(&self.speed, &other.speed) && near(&self.effect, &other.effect)
+    }
+
     /// The command that the robot gets if this drive stands still.
     #[must_use]
     pub fn without(&self, command: &[f64; AXES]) -> [f64; AXES] {

@@ -102,7 +102,7 @@ impl Combinations {
 #[must_use]
 pub fn product(powers: &[u8; AXES], command: &[f64; AXES]) -> f64 {
     let axes = powers.iter().zip(command).filter(|(power, _)| **power > 0);
-    axes.map(|(&power, value)| value.powi(i32::from(power)))
+    axes.map(|(&power, value)| (1..power).fold(*value, |product, _| product * value))
         .product()
 }
 

@@ -313,7 +313,7 @@ impl Law {
     /// What a channel whose readings say nothing from `first` on adds to a signature that is
     /// `weighed`, so that the signature says nothing of these readings either.
     #[must_use]
-    pub fn silence(&self, channel: usize, first: usize, weighed: &Row) -> Row {
+    pub fn completion(&self, channel: usize, first: usize, weighed: &Row) -> Row {
         let whitening = &self.own_whitening[channel];
         let mut whitened = product(whitening, weighed);
         whitened[..first].fill(0.0);

@@ -10,6 +10,7 @@
 //! | [`coverage`] | which commands a log covers |
 //! | [`observation`] | frames averaged into observations, and the last few of them |
 //! | [`channel`] | one channel: terms, weights, noise |
+//! | [`prediction`] | the predictions of all channels |
 //! | [`window`] | the last seconds of residuals and predictions, in blocks |
 //! | [`law`], [`directions`] | the joint law of the residuals, and its principal directions |
 //! | [`scatter`] | the law of how rough they are |
@@ -55,7 +56,7 @@ mod model_check;
 pub mod monitor;
 pub mod observation;
 pub mod orders;
-mod prediction;
+pub mod prediction;
 pub mod scatter;
 pub mod shift;
 pub mod signature;

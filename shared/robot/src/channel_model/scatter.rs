@@ -17,9 +17,10 @@ const LEAST: f64 = 1e-3;
 /// Fewest changes in a window that say anything.
 const CHANGES_MIN: usize = 12;
 
-/// Fewest changes in the last second that say anything, and the most that they say, nats.
+/// Fewest changes in the last second that say anything.
 const STILL_CHANGES_MIN: usize = 4;
-const STILL_MAX: f64 = 20.0;
+/// The most that they say, nats.
+pub const STILL_MAX: f64 = 20.0;
 
 /// Mean and covariance of the logarithms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]

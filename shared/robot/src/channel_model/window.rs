@@ -6,6 +6,7 @@ mod sums;
 use vigil_checkpoint::{Checkpoint, CheckpointValue};
 
 use super::channel::{CLIP, Channel, Commands, Scales};
+use super::component::Drive;
 use super::law::{BLOCK_S, BLOCKS, Row};
 use super::level::Level;
 use super::observation::History;
@@ -66,6 +67,9 @@ pub struct Window {
     per_block: usize,
     /// Length of an observation, s.
     interval_s: f64,
+    /// Group of each drive: those that move the robot in the same way.
+    #[checkpoint(fixed)]
+    groups: Vec<usize>,
     ring: Vec<Moment>,
     newest: usize,
     /// Observations since the record began, at most as many as the ring holds.
@@ -85,9 +89,9 @@ pub struct Window {
     pub predicted: [Row; CHANNELS_MAX],
     /// How the whitened residuals of each channel change if it is late by each of [`DELAYS`].
     pub late: [[Row; CHANNELS_MAX]; DELAYS.len()],
-    /// Each drive's part of the whitened predictions.
+    /// The part of the whitened predictions of a drive of each group.
     pub share: [[Row; CHANNELS_MAX]; DRIVES_MAX],
-    /// That of an offset of a tenth of each drive's largest speed.
+    /// That of an offset of a tenth of such a drive's largest speed.
     pub offset: [[Row; CHANNELS_MAX]; DRIVES_MAX],
     /// Mean square of the change from one residual to the next in motion, and how many there were.
     pub roughness: [(f64, usize); CHANNELS_MAX],
@@ -105,6 +109,7 @@ impl Window {
         Self {
             predictor: Predictor::new(channels.iter().map(|(_, channel)| channel)),
             channels,
+            groups: groups(&scales.drives),
             scales,
             per_block,
             interval_s,
@@ -130,7 +135,19 @@ impl Window {
     /// Drives.
     #[must_use]
     pub fn drives(&self) -> usize {
-        self.scales.drives.len().min(DRIVES_MAX)
+        self.groups.len()
+    }
+
+    /// Group of a drive: those that move the robot in the same way.
+    #[must_use]
+    pub fn group(&self, drive: usize) -> usize {
+        self.groups[drive]
+    }
+
+    /// Groups of drives.
+    #[must_use]
+    pub fn groups(&self) -> usize {
+        self.groups.iter().max().map_or(0, |last| last + 1)
     }
 
     /// Length of a block, s.
@@ -215,11 +232,11 @@ impl Window {
         self.add_drives(&mut sums, commands, &of_commands);
         self.newest_part = (self.newest_part + 1) % self.per_block;
         self.parts[self.newest_part] = sums;
-        let (channels, drives) = (self.channels.len(), self.drives());
+        let (channels, groups) = (self.channels.len(), self.groups());
         let block = &mut self.blocks[newest];
         *block = Sums::ZERO;
         for part in &self.parts {
-            block.add(part, channels, drives);
+            block.add(part, channels, groups);
         }
         self.average();
     }
@@ -259,8 +276,12 @@ impl Window {
         commands: &Commands,
         of_commands: &[f64; CHANNELS_MAX],
     ) {
-        for d in 0..self.drives() {
-            let (drive, speed) = (&self.scales.drives[d], self.scales.speeds[d]);
+        for group in 0..self.groups() {
+            let mut drives = self.groups.iter();
+            let Some(first) = drives.position(|of_drive| *of_drive == group) else {
+                continue;
+            };
+            let (drive, speed) = (&self.scales.drives[first], self.scales.speeds[first]);
             let without = commands.map(|command| drive.without(&command));
             let more = commands.map(|command| {
                 std::array::from_fn(|axis| command[axis] + OFFSET * speed * drive.effect[axis])
@@ -269,8 +290,8 @@ impl Window {
             let more = self.predictor.predict(&more, &self.scales);
             // Zero where nothing was measured.
             for (i, unit) in sums.unit.iter().enumerate().take(self.channels.len()) {
-                sums.share[d][i] = (of_commands[i] - without[i]) * unit;
-                sums.offset[d][i] = (more[i] - of_commands[i]) * unit;
+                sums.share[group][i] = (of_commands[i] - without[i]) * unit;
+                sums.offset[group][i] = (more[i] - of_commands[i]) * unit;
             }
         }
     }
@@ -294,7 +315,7 @@ impl Window {
 
     /// Fills the rows with the means of the blocks.
     fn average(&mut self) {
-        let (n, drives) = (self.channels.len(), self.drives());
+        let (n, groups) = (self.channels.len(), self.groups());
         // What was not measured counts as expected: of a few readings a mean is no better.
         let part = 1.0 / self.per_block as f64;
         self.roughness = [(0.0, 0); CHANNELS_MAX];
@@ -313,9 +334,9 @@ impl Window {
                     row[i][block] = part * late[i];
                 }
                 let gain = part * (1.0 + gain);
-                for d in 0..drives {
-                    self.share[d][i][block] = gain * sums.share[d][i];
-                    self.offset[d][i][block] = gain * sums.offset[d][i];
+                for group in 0..groups {
+                    self.share[group][i][block] = gain * sums.share[group][i];
+                    self.offset[group][i][block] = gain * sums.offset[group][i];
                 }
                 let changes = sums.changes[i] as usize;
                 let add = |(sum, count): &mut (f64, usize), square: f64| {
@@ -341,4 +362,15 @@ impl Window {
     pub fn whole_blocks(&self) -> usize {
         self.count / self.per_block
     }
+}
+
+/// Groups of drives that move the robot in the same way, numbered by their first ones.
+fn groups(drives: &[Drive]) -> Vec<usize> {
+    let mut groups: Vec<usize> = Vec::new();
+    for (i, drive) in drives.iter().enumerate().take(DRIVES_MAX) {
+        let like = drives[..i].iter().position(|other| drive.moves_like(other));
+        let next = groups.iter().max().map_or(0, |last| last + 1);
+        groups.push(like.map_or(next, |like| groups[like]));
+    }
+    groups
 }

@@ -70,7 +70,8 @@ fn the_law_says_what_its_whole_covariance_says() {
             near(b, s.dot(&(&precision * &z)));
             near(a, s.dot(&(&precision * &s)));
         }
-        let changes = law.joint_change_beside(&signature, 0);
+        let mut changes = law.joint_change(&signature, None);
+        law.silence(&mut changes, &signature, 0);
         let others = 2 * BLOCKS;
         let of_others = covariance
             .view((BLOCKS, BLOCKS), (others, others))
@@ -89,7 +90,7 @@ fn the_law_says_what_its_whole_covariance_says() {
         near(product - hidden, s_others.dot(&(&of_others * z_others)));
         // Completed so that they say nothing of the first.
         let mut silent = rows(&s);
-        let added = law.silence(0, 0, &weighed[0]);
+        let added = law.completion(0, 0, &weighed[0]);
         silent[0].iter_mut().zip(added).for_each(|(a, b)| *a += b);
         law.weighed(&silent)[0]
             .into_iter()

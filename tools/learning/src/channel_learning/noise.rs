@@ -1,7 +1,10 @@
 //! What is left of a channel: its variance by speed and by change.
 
+use std::iter::once;
+
 use vigil_robot::channel_model::channel::{VarianceBasis, commands};
 use vigil_robot::channel_model::level::Level;
+use vigil_robot::channel_model::prediction::Predictor;
 use vigil_robot::channel_model::{Channel, History, Range, Scales};
 
 use super::record::{FOLDS, Record};
@@ -54,6 +57,8 @@ fn residuals(
     records: &[Record],
     scales: &Scales,
 ) -> Vec<Residual> {
+    let predictors = models.iter().map(|model| Predictor::new(once(model)));
+    let predictors: Vec<Predictor> = predictors.collect();
     let mut out = Vec::new();
     for (run, record) in records.iter().enumerate() {
         let mut before = None;
@@ -65,7 +70,7 @@ fn residuals(
             if *fold != level_of {
                 (level, level_of) = (Level::default(), *fold);
             }
-            let mut predicted = model.predict(&commands(history), scales);
+            let [mut predicted, ..] = predictors[*fold].predict(&commands(history), scales);
             let mut variance = 1.0;
             if model.drifts {
                 variance = level.variance();

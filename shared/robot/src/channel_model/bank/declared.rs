@@ -34,7 +34,7 @@ impl Bank {
         let Some(shift) = self.declared.shift(fault, self.first) else {
             return Weighed::NONE;
         };
-        let unit = |channel: usize| (self.window.unit[channel], self.bias_sd(channel));
+        let unit = |channel: usize| (self.window.unit[channel], self.bias_sd[channel]);
         let law = self.law();
         let mut shifts = [Shift::default(); BLOCKS];
         for first in JOINT_ONSETS {

@@ -6,6 +6,7 @@ use vigil_inference::logspace::{log_add, log_sum_exp};
 use super::{Bank, ERRATIC, IMPOSSIBLE, KINDS_MAX, Weighed};
 use crate::channel_model::fault_kind::{DRIVE_KINDS, FaultKind, SENSOR_KINDS};
 use crate::channel_model::law::BLOCKS;
+use crate::channel_model::scatter::STILL_MAX;
 use crate::channel_model::{CHANNELS_MAX, COMPONENTS_MAX};
 
 /// Mean square of the residuals, where healthy ones have 1, up to which no second fault is looked
@@ -103,30 +104,63 @@ impl Bank {
         slot.log_ratio = sum;
     }
 
-    /// The likeliest fault of the channels that are not left out.
+    /// The likeliest fault of the channels that are not left out. A sensor of which even silence
+    /// would explain less than another fault does is not looked at.
     fn second(&mut self, left_out: &[bool; CHANNELS_MAX]) -> Option<(usize, f64)> {
         self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
-        for channel in (0..self.channels.len()).filter(|&channel| !left_out[channel]) {
-            self.weigh_sensor(channel);
-        }
+        let mut best = None;
+        self.weigh_drives();
         for drive in 0..self.drives.len() {
-            self.weigh_drive(drive);
+            let component = self.drives[drive].component;
+            best = likelier(best, (component, self.of_means(component, &DRIVE_KINDS)));
         }
-        // Noise and silence are no matter of the means, and the first sensor's are among them.
-        let total = |component: usize, kinds: &[FaultKind]| {
-            let places = self.weighed[component].iter().zip(kinds);
-            let of_means = places.map(|(one, kind)| match kind {
-                FaultKind::Noise | FaultKind::Rough | FaultKind::Missing => IMPOSSIBLE,
-                _ => one.log_ratio,
-            });
-            of_means.fold(IMPOSSIBLE, log_add) - (KINDS_MAX as f64).ln()
-        };
-        let sensors = self.components();
-        let sensors = sensors.map(|component| (component, total(component, &SENSOR_KINDS)));
-        let drives = self.drives.iter().map(|one| one.component);
-        let drives = drives.map(|component| (component, total(component, &DRIVE_KINDS)));
-        let rated = sensors.chain(drives);
-        let best = rated.max_by(|a, b| a.1.total_cmp(&b.1))?;
-        (best.1 > IMPOSSIBLE).then_some(best)
+        let mut bounds = [IMPOSSIBLE; COMPONENTS_MAX];
+        for (channel, component) in self.components().enumerate() {
+            if !left_out[channel] {
+                let silenced = self.law().silenced(channel)[0];
+                let bound = self.law().log_ratio(silenced, -STILL_MAX);
+                bounds[component] = bound.max(bounds[component]);
+            }
+        }
+        loop {
+            let (component, bound) =
+                bounds
+                    .iter()
+                    .enumerate()
+                    .fold((0, IMPOSSIBLE), |most, (component, bound)| {
+                        if *bound > most.1 {
+                            (component, *bound)
+                        } else {
+                            most
+                        }
+                    });
+            if bound <= best.map_or(IMPOSSIBLE, |(_, log_ratio)| log_ratio) {
+                return best;
+            }
+            bounds[component] = IMPOSSIBLE;
+            for channel in 0..self.channels.len() {
+                if self.channels[channel].component == component {
+                    self.weigh_sensor(channel);
+                }
+            }
+            best = likelier(best, (component, self.of_means(component, &SENSOR_KINDS)));
+        }
     }
+
+    /// What is said of a component by the means alone: noise and silence are no matter of these,
+    /// and the first sensor's are among them.
+    fn of_means(&self, component: usize, kinds: &[FaultKind]) -> f64 {
+        let places = self.weighed[component].iter().zip(kinds);
+        let of_means = places.map(|(one, kind)| match kind {
+            FaultKind::Noise | FaultKind::Rough | FaultKind::Missing => IMPOSSIBLE,
+            _ => one.log_ratio,
+        });
+        of_means.fold(IMPOSSIBLE, log_add) - (KINDS_MAX as f64).ln()
+    }
+}
+
+/// The likelier one of two components, with what is said of them; none of what is impossible.
+fn likelier(best: Option<(usize, f64)>, other: (usize, f64)) -> Option<(usize, f64)> {
+    let most = best.map_or(IMPOSSIBLE, |(_, log_ratio)| log_ratio);
+    if other.1 > most { Some(other) } else { best }
 }

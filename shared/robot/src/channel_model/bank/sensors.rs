@@ -40,7 +40,7 @@ impl Bank {
     fn sensor(&self, channel: usize) -> [Weighed; KINDS_MAX] {
         let place = &self.channels[channel];
         let is_pose = place.target.quantity.is_pose();
-        let bias_sd = self.bias_sd(channel);
+        let bias_sd = self.bias_sd[channel];
         let silenced = self.law().silenced(channel);
         // A sensor that repeats itself is not as rough as it was.
         let newest = self.window.newest_roughness[channel];

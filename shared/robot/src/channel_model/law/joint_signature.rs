@@ -57,14 +57,13 @@ impl Law {
         })
     }
 
-    /// The same where the readings of one channel say nothing.
-    #[must_use]
-    pub fn joint_change_beside(
+    /// Takes out of what the window says of a change what the readings of one channel say.
+    pub fn silence(
         &self,
+        changes: &mut [Change; BLOCKS],
         signature: &JointSignature,
         silent: usize,
-    ) -> [Change; BLOCKS] {
-        let mut changes = self.joint_change(signature, None);
+    ) {
         // What each block of the signature is expected to show in the channel.
         let mut shown = [[0.0; BLOCKS]; BLOCKS];
         let laws = self.directions.iter().zip(&self.precision);
@@ -85,6 +84,5 @@ impl Law {
             change.b -= dot(&whitened, &gradient);
             change.a -= dot(&whitened, &whitened);
         }
-        changes
     }
 }

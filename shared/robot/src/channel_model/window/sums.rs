@@ -23,7 +23,7 @@ pub struct Sums {
     pub predicted: Values,
     /// Of how residuals change if the sensor is late by each of [`DELAYS`].
     pub late: [Values; DELAYS.len()],
-    /// Of each drive's part of the whitened predictions, and of an offset of it.
+    /// Of the part of the whitened predictions of a drive of each group, and of an offset of it.
     pub share: [Values; DRIVES_MAX],
     pub offset: [Values; DRIVES_MAX],
     /// How many changes from one reading to the next there are in motion.
@@ -48,8 +48,8 @@ impl Sums {
         moved: NONE,
     };
 
-    /// Adds those of other observations, of so many channels and drives.
-    pub fn add(&mut self, other: &Self, channels: usize, drives: usize) {
+    /// Adds those of other observations, of so many channels and groups of drives.
+    pub fn add(&mut self, other: &Self, channels: usize, groups: usize) {
         let add = |sums: &mut Values, more: &Values| {
             let sums = sums.iter_mut().zip(more).take(channels);
             sums.for_each(|(sum, more)| *sum += more);
@@ -63,7 +63,7 @@ impl Sums {
         }
         let shares = self.share.iter_mut().zip(&other.share);
         let offsets = self.offset.iter_mut().zip(&other.offset);
-        for (sums, more) in shares.take(drives).chain(offsets.take(drives)) {
+        for (sums, more) in shares.take(groups).chain(offsets.take(groups)) {
             add(sums, more);
         }
         add(&mut self.changes, &other.changes);

@@ -279,7 +279,7 @@ pub(super) fn signature(
     }
     let mut weighed = law.weighed(&dense);
     if let Some(i) = silent {
-        let row = law.silence(i, first, &weighed[i]);
+        let row = law.completion(i, first, &weighed[i]);
         dense[i] = row;
         rows.push((i, row));
         weighed = law.weighed(&dense);

@@ -3,6 +3,7 @@
 use vigil_robot::channel_model::channel::commands;
 use vigil_robot::channel_model::law::{BLOCK_S, BLOCKS, Law};
 use vigil_robot::channel_model::observation::smoothed;
+use vigil_robot::channel_model::prediction::Predictor;
 use vigil_robot::channel_model::window::{Suspects, Window};
 use vigil_robot::channel_model::{AXES, History, Model, Observation, Range, Scales};
 
@@ -67,6 +68,7 @@ impl Manoeuvre {
     pub fn snapshot(&self, model: &Model, scales: &Scales, law: &mut Law) -> Snapshot {
         let used = model.channel.iter().cloned().enumerate().collect();
         let mut window = Window::new(used, scales.clone(), model.interval_s);
+        let predictor = Predictor::new(model.channel.iter());
         let mut history = History::default();
         let driven = self.blocks * window.per_block();
         // At rest for long enough for what a late sensor would read.
@@ -86,9 +88,10 @@ impl Manoeuvre {
             now.smoothed = smoothed(Some(&last), &now);
             let mut ahead = history;
             ahead.push(now);
-            for (value, channel) in now.values.iter_mut().zip(&model.channel) {
-                *value = Some(channel.predict(&commands(&ahead), scales));
-            }
+            let predicted = predictor.predict(&commands(&ahead), scales);
+            let values = now.values.iter_mut().zip(predicted);
+            let channels = values.take(model.channel.len());
+            channels.for_each(|(value, predicted)| *value = Some(predicted));
             history.push(now);
             window.push(
                 &history,

@@ -78,9 +78,11 @@ impl Snapshot {
             late: window.late[DELAY][..n].to_vec(),
             share: drives
                 .clone()
-                .map(|d| window.share[d][..n].to_vec())
+                .map(|d| window.share[window.group(d)][..n].to_vec())
                 .collect(),
-            offset: drives.map(|d| window.offset[d][..n].to_vec()).collect(),
+            offset: drives
+                .map(|d| window.offset[window.group(d)][..n].to_vec())
+                .collect(),
             command,
             residual: (0..n).map(residual).collect(),
         }
