@@ -11,6 +11,7 @@
 
 mod joint_signature;
 mod likelihoods;
+mod own_row;
 
 use serde::{Deserialize, Serialize};
 use vigil_checkpoint::Checkpoint;
@@ -24,6 +25,7 @@ use super::square::{
 
 pub use joint_signature::JointSignature;
 pub use likelihoods::Likelihoods;
+pub use own_row::OwnRow;
 
 /// Length of each, s.
 pub const BLOCK_S: f64 = 0.5;
@@ -276,12 +278,21 @@ impl Law {
         BLOCKS - from.max(self.first)
     }
 
-    /// What a window says of a change of one channel, from each block on.
+    /// A row of a channel under its law given all other readings.
     #[must_use]
-    pub fn change(&self, channel: usize, signature: &Row) -> [Change; BLOCKS] {
-        let signature = self.masked(channel, signature);
-        let b = sums_from(by_block(&signature, &self.gradient[channel]));
-        let a = self.own_square(channel, &signature);
+    pub fn own_row(&self, channel: usize, row: &Row) -> OwnRow {
+        OwnRow {
+            row: *row,
+            later: product(&self.own_lower[channel], row),
+        }
+    }
+
+    /// What a window says of a change of one channel, from each block on; it is zero where nothing
+    /// was measured.
+    #[must_use]
+    pub fn change(&self, channel: usize, signature: &OwnRow) -> [Change; BLOCKS] {
+        let b = sums_from(by_block(&signature.row, &self.gradient[channel]));
+        let a = signature.square();
         std::array::from_fn(|first| Change {
             b: b[first],
             a: a[first],
@@ -325,23 +336,6 @@ impl Law {
     pub fn silenced(&self, channel: usize) -> Row {
         let whitened = product(&self.own_whitening[channel], &self.gradient[channel]);
         sums_from(by_block(&whitened, &whitened))
-    }
-
-    /// Square of a row of a channel under the law from each block on, given all other readings.
-    #[must_use]
-    pub fn own_square(&self, channel: usize, row: &Row) -> Row {
-        let later = product(&self.own_lower[channel], row);
-        sums_from(by_block(row, &later)).map(|half| 2.0 * half)
-    }
-
-    /// The same of the product of two rows.
-    #[must_use]
-    pub fn own_product(&self, channel: usize, one: &Row, other: &Row) -> Row {
-        let lower = &self.own_lower[channel];
-        let [later_one, later_other] = [one, other].map(|row| product(lower, row));
-        sums_from(std::array::from_fn(|block| {
-            one[block] * later_other[block] + other[block] * later_one[block]
-        }))
     }
 
     /// Natural logarithm of how much more likely the window is if its square were less by `less`

@@ -246,11 +246,8 @@ impl Monitor {
                 }
                 let log_odds = prior + found.log_ratio - (KINDS_MAX as f64).ln();
                 match Class::from_kind(kind) {
-                    Some(class) => {
-                        let slot = &mut raw[i][class as usize];
-                        *slot = log_add(*slot, log_odds);
-                    }
-                    None => certain[i] = log_add(certain[i], log_odds),
+                    Some(class) => add(&mut raw[i][class as usize], log_odds),
+                    None => add(&mut certain[i], log_odds),
                 }
             }
         }
@@ -308,7 +305,7 @@ impl Monitor {
                     Class::Noise => &mut odds_of_noise[component],
                     _ => &mut odds[component],
                 };
-                *slot = log_add(*slot, share);
+                add(slot, share);
             }
         }
         self.divide_declared(&raw[..n], &mut odds[..n]);
@@ -368,6 +365,14 @@ impl Monitor {
         self.report.channels = channels.map(|value| (value + prior).max(IMPOSSIBLE));
         self.report.gains = channels.map(|value| value * per_observation);
     }
+}
+
+/// Adds what log-odds say.
+fn add(slot: &mut f64, log_odds: f64) {
+    *slot = match *slot > IMPOSSIBLE {
+        true => log_add(*slot, log_odds),
+        false => log_odds,
+    };
 }
 
 /// Log-odds of a class by its tail; as they are if none is known.

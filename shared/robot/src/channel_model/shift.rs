@@ -120,7 +120,7 @@ mod tests {
         let z = std::array::from_fn(|block| Some(0.3 * block as f64 - 1.0));
         law.take(&[z, [None; BLOCKS]]);
         let row: Row = std::array::from_fn(|block| 1.0 + 0.1 * block as f64);
-        let change = law.change(0, &row)[3];
+        let change = law.change(0, &law.own_row(0, &row))[3];
         let found = ShiftLaw::new(&law, &[0]).weigh(&law, 3, |_| (row, 2.0));
         let precision = change.a + 0.25;
         assert!((found.less - change.b * change.b / precision).abs() < 1e-9);

@@ -108,7 +108,7 @@ fn the_law_says_of_a_channel_what_its_whole_covariance_says() {
         let (z, s) = (draw(), draw());
         law.take(&rows(&z).iter().map(|row| row.map(Some)).collect::<Vec<_>>());
         for channel in 0..3 {
-            let own = rows(&s)[channel];
+            let [own, other] = [&s, &z].map(|values| law.own_row(channel, &rows(values)[channel]));
             let changes = law.change(channel, &own);
             for (first, Change { b, a }) in changes.into_iter().enumerate() {
                 let (from, to) = (channel * BLOCKS + first, (channel + 1) * BLOCKS);
@@ -118,13 +118,13 @@ fn the_law_says_of_a_channel_what_its_whole_covariance_says() {
                 });
                 near(b, alone.dot(&(&precision * &z)));
                 near(a, alone.dot(&(&precision * &alone)));
-                near(law.own_square(channel, &own)[first], a);
-                let other = DVector::from_fn(3 * BLOCKS, |i, _| match (from..to).contains(&i) {
+                near(own.square()[first], a);
+                let of_z = DVector::from_fn(3 * BLOCKS, |i, _| match (from..to).contains(&i) {
                     true => z[i],
                     false => 0.0,
                 });
-                let product = law.own_product(channel, &own, &rows(&z)[channel]);
-                near(product[first], alone.dot(&(&precision * &other)));
+                let product = own.product(&other)[first];
+                near(product, alone.dot(&(&precision * &of_z)));
                 // Without these readings: the square of the others under their own law.
                 let rest: Vec<usize> = (0..3 * BLOCKS)
                     .filter(|i| !(from..to).contains(i))
@@ -173,7 +173,7 @@ fn a_window_that_has_just_begun_is_judged_by_the_law_of_what_is_there() {
     }
     short.take(&window);
     assert!((short.square() - z.dot(&(&precision * &z))).abs() < 1e-9);
-    let Change { b, a } = short.change(1, &[1.0; BLOCKS])[0];
+    let Change { b, a } = short.change(1, &short.own_row(1, &[1.0; BLOCKS]))[0];
     let shift = DVector::from_fn(there.len(), |i, _| {
         f64::from(u8::from(there[i] / BLOCKS == 1))
     });
@@ -316,7 +316,7 @@ fn channels_that_have_nothing_to_do_with_the_others_leave_them_their_own_law() {
     without.take(&[[None; BLOCKS], rows[1], rows[2]]);
     others.take(&rows[1..]);
     assert!((without.square() - others.square()).abs() < 1e-9);
-    let change = without.change(2, &[1.0; BLOCKS])[3];
-    let expected = others.change(1, &[1.0; BLOCKS])[3];
+    let change = without.change(2, &without.own_row(2, &[1.0; BLOCKS]))[3];
+    let expected = others.change(1, &others.own_row(1, &[1.0; BLOCKS]))[3];
     assert!((change.a - expected.a).abs() < 1e-9 && (change.b - expected.b).abs() < 1e-9);
 }

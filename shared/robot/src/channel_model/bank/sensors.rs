@@ -4,7 +4,7 @@ use vigil_inference::logspace::log_add;
 
 use super::{Bank, ERRATIC, HELD, IMPOSSIBLE, JOINT_ONSETS, KINDS_MAX, ONSETS, Weighed};
 use crate::channel_model::fault_kind::{FaultKind, GAIN_SD, SENSOR_KINDS};
-use crate::channel_model::law::{BLOCKS, Change, Row};
+use crate::channel_model::law::{BLOCKS, Change, OwnRow, Row};
 use crate::channel_model::square::sums_from;
 use crate::channel_model::window::DELAYS;
 
@@ -46,10 +46,14 @@ impl Bank {
         let newest = self.window.newest_roughness[channel];
         let scatter = self.laws.scatter.as_ref();
         let still = scatter.map_or(0.0, |scatter| scatter.still(channel, newest));
+        let law = self.law();
+        let unit = law.own_row(channel, &self.window.unit[channel]);
+        let of_unit = law.change(channel, &unit);
         SENSOR_KINDS.map(|kind| match kind {
-            FaultKind::Bias => self.added(channel, &self.window.unit[channel], bias_sd),
+            FaultKind::Bias => self.sized(ONSETS, &of_unit, bias_sd),
             FaultKind::Gain => {
-                let change = self.added(channel, &self.window.predicted[channel], GAIN_SD);
+                let predicted = law.own_row(channel, &self.window.predicted[channel]);
+                let change = self.sized(ONSETS, &law.change(channel, &predicted), GAIN_SD);
                 Weighed {
                     size: 1.0 + change.size,
                     ..change
@@ -57,8 +61,8 @@ impl Bank {
             }
             // The velocity of a pose that drifts is biased, and one that stands is zero.
             FaultKind::Drift | FaultKind::Frozen if is_pose => Weighed::NONE,
-            FaultKind::Drift => self.drifting(channel, bias_sd / DRIFT_S),
-            FaultKind::Frozen => self.frozen(channel, &silenced, HELD - still),
+            FaultKind::Drift => self.drifting(channel, (&unit, &of_unit), bias_sd / DRIFT_S),
+            FaultKind::Frozen => self.frozen(channel, &unit, (&silenced, HELD - still)),
             FaultKind::Zero => self.zero(channel, &silenced, -still),
             FaultKind::Delay => self.delayed(channel),
             FaultKind::Erratic => self.erratic(&silenced),
@@ -74,20 +78,25 @@ impl Bank {
         })
     }
 
-    fn added(&self, channel: usize, signature: &Row, size_sd: f64) -> Weighed {
-        self.sized(ONSETS, &self.law().change(channel, signature), size_sd)
-    }
-
-    fn drifting(&self, channel: usize, size_sd: f64) -> Weighed {
-        let unit = &self.window.unit[channel];
-        let mut changes = [Change::default(); BLOCKS];
-        for first in JOINT_ONSETS {
-            let grown: Row = std::array::from_fn(|block| {
-                let blocks = block.saturating_sub(first) as f64 + 0.5;
-                unit[block] * self.window.block_s() * blocks
-            });
-            changes[first] = self.law().change(channel, &grown)[first];
-        }
+    /// What grows from some block on is what grows from the first one, less a bias.
+    fn drifting(
+        &self,
+        channel: usize,
+        (unit, of_unit): (&OwnRow, &[Change; BLOCKS]),
+        size_sd: f64,
+    ) -> Weighed {
+        let (law, block_s) = (self.law(), self.window.block_s());
+        let row = &self.window.unit[channel];
+        let grown = std::array::from_fn(|block| row[block] * block_s * (block as f64 + 0.5));
+        let grown = law.own_row(channel, &grown);
+        let (of_grown, products) = (law.change(channel, &grown), grown.product(unit));
+        let changes = std::array::from_fn(|first| {
+            let less = first as f64 * block_s;
+            Change {
+                b: of_grown[first].b - less * of_unit[first].b,
+                a: of_grown[first].a - less * (2.0 * products[first] - less * of_unit[first].a),
+            }
+        });
         self.sized(JOINT_ONSETS, &changes, size_sd)
     }
 
@@ -98,7 +107,8 @@ impl Bank {
             .chunks_exact_mut(JOINT_ONSETS.len())
             .zip(&self.window.late)
         {
-            let changes = self.law().change(channel, &late[channel]);
+            let late = self.law().own_row(channel, &late[channel]);
+            let changes = self.law().change(channel, &late);
             let onsets = less.iter_mut().zip(JOINT_ONSETS);
             onsets.for_each(|(less, first)| *less = changes[first].less());
         }
@@ -133,11 +143,11 @@ impl Bank {
     fn zero(&self, channel: usize, silenced: &Row, price: f64) -> Weighed {
         let (z, predicted) = (self.law().row(channel), &self.window.predicted[channel]);
         let apart: Row = std::array::from_fn(|block| z[block] + predicted[block]);
-        let left = self.law().own_square(channel, &apart);
+        let left = self.law().own_row(channel, &apart).square();
         self.replaced(silenced, &left, price)
     }
 
-    fn frozen(&self, channel: usize, silenced: &Row, price: f64) -> Weighed {
+    fn frozen(&self, channel: usize, of_unit: &OwnRow, (silenced, price): (&Row, f64)) -> Weighed {
         let law = self.law();
         let (z, unit) = (law.row(channel), &self.window.unit[channel]);
         let predicted = &self.window.predicted[channel];
@@ -152,8 +162,9 @@ impl Bank {
         // The square of `apart - change * unit`, from a value near to all of these.
         let apart: Row =
             std::array::from_fn(|block| z[block] + predicted[block] - held[0] * unit[block]);
-        let squares = [&apart, unit].map(|row| law.own_square(channel, row));
-        let products = law.own_product(channel, &apart, unit);
+        let apart = law.own_row(channel, &apart);
+        let squares = [&apart, of_unit].map(OwnRow::square);
+        let products = apart.product(of_unit);
         let left = std::array::from_fn(|first| {
             let change = held[first] - held[0];
             squares[0][first] - change * (2.0 * products[first] - change * squares[1][first])
