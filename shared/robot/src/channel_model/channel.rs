@@ -97,8 +97,8 @@ impl Scales {
 
     /// Commands with what terms are made of.
     #[must_use]
-    pub fn told(&self, commands: &Commands) -> Told {
-        Told {
+    pub fn scaled(&self, commands: &Commands) -> ScaledCommands {
+        ScaledCommands {
             plain: *commands,
             scaled: commands
                 .map(|command| std::array::from_fn(|axis| command[axis] / self.axes[axis])),
@@ -108,7 +108,7 @@ impl Scales {
 
 /// The newest commands.
 #[derive(Debug, Clone)]
-pub struct Told {
+pub struct ScaledCommands {
     plain: Commands,
     /// Each axis divided by its learned size.
     scaled: Commands,
@@ -144,24 +144,24 @@ impl Term {
 
     /// Its value under commands.
     #[must_use]
-    pub fn value(&self, told: &Told, scales: &Scales) -> f64 {
+    pub fn value(&self, commands: &ScaledCommands, scales: &Scales) -> f64 {
         let place = match self.of {
             Regressor::Smoothed => DEPTH + self.lag,
             _ => self.lag,
         };
-        let place = place.min(told.plain.len() - 1);
+        let place = place.min(commands.plain.len() - 1);
         let axis = self.index.min(AXES - 1);
         match self.of {
             Regressor::Constant => 1.0,
-            Regressor::Command => product(&self.powers, &told.scaled[place]),
-            Regressor::Lagged => told.scaled[place][axis],
-            Regressor::Smoothed if are_zero(&self.powers) => told.scaled[place][axis],
+            Regressor::Command => product(&self.powers, &commands.scaled[place]),
+            Regressor::Lagged => commands.scaled[place][axis],
+            Regressor::Smoothed if are_zero(&self.powers) => commands.scaled[place][axis],
             Regressor::Smoothed => {
-                told.scaled[place][axis] * product(&self.powers, &told.scaled[0])
+                commands.scaled[place][axis] * product(&self.powers, &commands.scaled[0])
             }
             Regressor::Sense => {
                 let drive = scales.drives.get(self.index);
-                let speed = drive.map_or(0.0, |drive| drive.commanded(&told.plain[place]));
+                let speed = drive.map_or(0.0, |drive| drive.commanded(&commands.plain[place]));
                 let largest = scales.speeds.get(self.index).copied().unwrap_or(1.0);
                 (speed / (SENSE * largest)).tanh()
             }

@@ -33,10 +33,10 @@ impl Predictor {
     /// The values predicted from the newest commands.
     #[must_use]
     pub fn predict(&self, commands: &Commands, scales: &Scales) -> [f64; CHANNELS_MAX] {
-        let told = scales.told(commands);
+        let commands = scales.scaled(commands);
         let mut predicted = [0.0; CHANNELS_MAX];
         for (term, weights) in self.terms.iter().zip(&self.weights) {
-            let value = term.value(&told, scales);
+            let value = term.value(&commands, scales);
             let sums = predicted.iter_mut().zip(weights);
             sums.for_each(|(sum, weight)| *sum += weight * value);
         }

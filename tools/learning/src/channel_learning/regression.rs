@@ -46,9 +46,9 @@ pub(super) fn fit(
             let Some(value) = value.filter(|_| is_used) else {
                 continue;
             };
-            let told = scales.told(&commands(history));
+            let commands = scales.scaled(&commands(history));
             let terms = channel.terms.iter();
-            let row: Vec<f64> = terms.map(|term| term.value(&told, scales)).collect();
+            let row: Vec<f64> = terms.map(|term| term.value(&commands, scales)).collect();
             let found = match channel.drifts {
                 true => trends.apart(channel, row, value, history),
                 false => Some((row, value)),
