@@ -9,10 +9,10 @@ use crate::harness::{Summary, binary, root, shared_machine, unique};
 /// What the assertion that fails on purpose leaves in the timeline: text and place.
 const TEXT: &str = "an assertion fails because a test wants it (shared/cycle/src/live.rs:";
 
-/// Runs a graph in which this service fails an assertion soon after each of its starts, until the
-/// launcher ends it.
-fn fail(service: ServiceName, options: &[&str]) -> String {
-    let name = unique(&format!("f-{}", service.as_str()));
+/// Runs a test's graph in which this service fails an assertion soon after each of its starts,
+/// until the launcher ends it.
+fn fail(test: &str, service: ServiceName, options: &[&str]) -> String {
+    let name = unique(&format!("{test}-{}", service.as_str()));
     let output = binary("vigil-launcher")
         .env("VIGIL_FAILS", service.as_str())
         .args(["--no-blackbox", "--rate", "500", "--duration", "60"])
@@ -21,7 +21,8 @@ fn fail(service: ServiceName, options: &[&str]) -> String {
         .output()
         .unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{text}");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{text}\n{told}");
     let args = GraphArgs {
         config: root().join("config/rover.toml"),
         graph: Some(name),
@@ -38,7 +39,7 @@ fn an_assertion_that_fails_twice_ends_the_graph_whichever_service_it_is() {
     let _machine = shared_machine();
     for service in ServiceName::ALL {
         let name = service.as_str();
-        let json = serde_json::from_str(&fail(service, &["--json"])).unwrap();
+        let json = serde_json::from_str(&fail("twice", service, &["--json"])).unwrap();
         let summary = Summary { json };
         assert_eq!(summary.json["ended"], "gave-up", "{name}");
         let gave_up = summary.json["gave_up"].as_str().unwrap();
@@ -64,7 +65,7 @@ fn an_assertion_that_fails_twice_ends_the_graph_whichever_service_it_is() {
 fn the_robot_stops_when_the_supervisors_assertion_fails() {
     let _machine = shared_machine();
     let summary = Summary {
-        json: serde_json::from_str(&fail(ServiceName::Supervisor, &["--json"])).unwrap(),
+        json: serde_json::from_str(&fail("stops", ServiceName::Supervisor, &["--json"])).unwrap(),
     };
     let [first, second] = [0, 1].map(|i| summary.events("assertion")[i].0);
     let stops = summary.events("safe-stop");
@@ -77,7 +78,7 @@ fn the_robot_stops_when_the_supervisors_assertion_fails() {
 #[test]
 fn people_read_the_assertion_in_the_timeline_too() {
     let _machine = shared_machine();
-    let text = fail(ServiceName::Detector, &[]);
+    let text = fail("read", ServiceName::Detector, &[]);
     let told = |line: &str| line.contains("detector    assertion") && line.contains(TEXT);
     assert_eq!(text.lines().filter(|line| told(line)).count(), 2, "{text}");
     assert!(

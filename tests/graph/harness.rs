@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -43,9 +42,7 @@ pub fn binary(name: &str) -> Command {
 
 /// Name for a graph that no other test and no other run of the tests has.
 pub fn unique(name: &str) -> String {
-    static COUNT: AtomicUsize = AtomicUsize::new(0);
-    let count = COUNT.fetch_add(1, Ordering::Relaxed);
-    format!("t{}-{count}-{name}", std::process::id())
+    format!("t{}-{name}", std::process::id())
 }
 
 /// The default graph file in `folder`, changed; the models stay where they are.

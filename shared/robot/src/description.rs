@@ -163,7 +163,7 @@ pub struct Description {
     pub name: String,
     /// Kind of motion.
     pub kinematics: Kinematics,
-    /// Radius of the wheels, m, above 0; a robot without a geometry needs none.
+    /// Radius of the wheels, m; 0 if left out, which only a robot without a geometry may have.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub wheel_radius_m: f64,
@@ -224,7 +224,7 @@ pub struct Description {
     /// How the body follows its command; left out: as that of a small robot.
     #[serde(default)]
     pub body: Body,
-    /// Prior rates of faults; left out: the defaults of [`FaultPrior`].
+    /// Prior rates of faults; left out: the defaults of its keys.
     #[serde(default)]
     pub fault_prior: FaultPrior,
     /// Limits; a robot without a geometry needs none.

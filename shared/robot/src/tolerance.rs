@@ -57,10 +57,10 @@ pub struct FurtherTolerance {
     /// What slopes add to the current of every wheel, A.
     #[schemars(range(max = 1e3), extend("exclusiveMinimum" = 0))]
     pub current_a: f64,
-    /// By how much one wheel's current differs from the model on level ground, A, ..
+    /// By how much one wheel's current differs from the model on level ground, A.
     #[schemars(range(max = 1e3), extend("exclusiveMinimum" = 0))]
     pub current_wheel_a: f64,
-    /// .. and on slopes besides, as a share of what these add.
+    /// By how much it differs on slopes besides, as a share of what these add.
     #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0))]
     pub current_share: f64,
 }

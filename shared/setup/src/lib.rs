@@ -27,7 +27,7 @@ pub use load::{Setup, load_decision, load_graph, load_model, load_robot, load_tr
 pub use origin::Origin;
 pub use problem::{Problem, SetupError};
 pub use ranges::{OutOfRange, Ranges};
-pub use reference::reference;
+pub use reference::{reference, reference_of, robot_reference};
 pub use running::{NotRunning, RunningArgs, RunningGraph};
 pub use schema::schema;
 pub use state_risks::state_risks;

@@ -1,13 +1,16 @@
-//! The reference page of the configuration, from its schema.
+//! Reference pages of files, from their schemas.
 
 use std::fmt::Write;
 
+use schemars::JsonSchema;
 use serde_json::{Map, Value};
+use vigil_robot::Description;
 
-use crate::schema::{allowed, schema};
+use crate::graph_file::GraphFile;
+use crate::schema::{allowed, schema_of};
 
-/// What stands above the tables.
-const HEAD: &str = "# Configuration
+/// What stands above the tables of a graph file.
+const GRAPH: &str = "# Configuration
 
 Every key of a graph file (`config/*.toml`). `vigil config --reference` prints this page from the
 settings that the rooms declare, `vigil config --schema` the same as a JSON Schema. The values of
@@ -17,8 +20,23 @@ Paths are relative to the graph file. An unknown key or a value out of range is 
 and line. A key without default is required.
 ";
 
+/// What stands above the tables of a robot's description.
+const ROBOT: &str = "# Robot description
+
+Every key of a robot's description (`config/robots/*.toml`). `vigil config --reference robot`
+prints this page from what the program reads. An unknown key or a value out of range is an error
+with file and line. A key without default is required, a table that may be left out says so.
+
+A robot with a model of channels, which is any but the six-wheel rover, needs only the keys at the
+top, `[[command]]` and what it has of `[measured]`, `[[wheels]]` and `[[channel]]`.
+";
+
 /// Units by the end of a key; the longest end decides.
-const UNITS: [(&str, &str); 15] = [
+const UNITS: [(&str, &str); 20] = [
+    ("_n_m_s", "N m s"),
+    ("_n_m", "N m"),
+    ("_rad_m", "rad/m"),
+    ("_m_m", "m/m"),
     ("_1_h", "1/h"),
     ("_1_m", "1/m"),
     ("_1_s", "1/s"),
@@ -31,6 +49,7 @@ const UNITS: [(&str, &str); 15] = [
     ("_ms", "ms"),
     ("_us", "us"),
     ("_ns", "ns"),
+    ("_a", "A"),
     ("_h", "h"),
     ("_m", "m"),
     ("_s", "s"),
@@ -43,13 +62,29 @@ struct Section<'a> {
     table: &'a Value,
 }
 
-/// The page, in Markdown.
+/// The page of a graph file, in Markdown.
 #[must_use]
 pub fn reference() -> String {
-    let schema = schema();
-    let mut found = Vec::new();
+    reference_of::<GraphFile>(GRAPH)
+}
+
+/// That of a robot's description.
+#[must_use]
+pub fn robot_reference() -> String {
+    reference_of::<Description>(ROBOT)
+}
+
+/// That of any file; `head` stands above the tables.
+#[must_use]
+pub fn reference_of<T: JsonSchema>(head: &str) -> String {
+    let schema = schema_of::<T>();
+    let mut found = vec![Section {
+        headings: Vec::new(),
+        meaning: text(&schema["description"]),
+        table: &schema,
+    }];
     collect("", &schema, &mut found);
-    let mut page = HEAD.to_owned();
+    let mut page = head.to_owned();
     for section in &found {
         write_section(section, &mut page);
     }
@@ -132,12 +167,11 @@ fn write_section(section: &Section<'_>, page: &mut String) {
         return;
     }
     let headings: Vec<_> = section.headings.iter().map(|h| format!("`{h}`")).collect();
-    let _ = write!(
-        page,
-        "\n## {}\n\n{}\n",
-        headings.join(", "),
-        section.meaning
-    );
+    let title = match headings.is_empty() {
+        true => "At the top".to_owned(),
+        false => headings.join(", "),
+    };
+    let _ = write!(page, "\n## {title}\n\n{}\n", section.meaning);
     page.push_str("\n| key | unit | range | default | meaning |\n|---|---|---|---|---|\n");
     for (key, value) in &values {
         let unit = unit(key, value);
@@ -189,8 +223,10 @@ fn range(value: &Value) -> String {
         return "`true`, `false`".to_owned();
     }
     let allowed = allowed(value).unwrap_or_default();
-    // Of a list it is the number of entries.
-    match value["type"] == "array" && !allowed.is_empty() {
+    match ["minItems", "maxItems"]
+        .iter()
+        .any(|key| value[*key].is_u64())
+    {
         true => format!("{allowed} entries"),
         false => allowed,
     }

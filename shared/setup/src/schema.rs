@@ -34,6 +34,7 @@ pub(crate) fn allowed(schema: &Value) -> Option<String> {
     let range = match (above, low, high) {
         (Some(above), _, Some(high)) => format!("above {above} to {high}"),
         (Some(above), _, None) => format!("above {above}"),
+        (None, Some(low), Some(high)) if low == high => format!("{low}"),
         (None, Some(low), Some(high)) => format!("{low} to {high}"),
         (None, Some(low), None) => format!("{low} or more"),
         (None, None, Some(high)) => format!("at most {high}"),

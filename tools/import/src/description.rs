@@ -5,12 +5,13 @@ use std::f64::consts::PI;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::ImportError;
 
 /// Unit of a column, brought to SI.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Unit {
     /// As it is.
@@ -48,7 +49,7 @@ impl Unit {
 }
 
 /// A column that holds time.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Clock {
     /// Column.
@@ -61,7 +62,7 @@ pub struct Clock {
 }
 
 /// One kind of file.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Source {
     /// Name, by which channels refer to it.
@@ -71,8 +72,8 @@ pub struct Source {
     #[serde(default)]
     pub file: Option<String>,
     /// Topic of ROS 2 messages in a recording (MCAP or SQLite, a file or rosbag2's folder), whose
-    /// fields are the columns (`pose.yaw`, `velocity[left_front_wheel]`; the rules: `ros.rs` beside
-    /// this file; the names: `vigil import --look`); left out: a CSV file.
+    /// fields are the columns (`pose.yaw`, `velocity[left_front_wheel]`; `vigil import --look`
+    /// lists their names); left out: a CSV file.
     #[serde(default)]
     pub topic: Option<String>,
     /// Separator of columns.
@@ -94,7 +95,7 @@ pub struct Source {
 }
 
 /// How a channel gets its value at the time of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
     /// Mean of the samples since the last frame; the last one where there is none. Between samples
@@ -155,12 +156,12 @@ impl<'de> Deserialize<'de> for Delay {
 }
 
 /// Where a channel of the frames comes from.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelSource {
     /// Column of Vigil's frames (`enc_L`, `yaw_rate`, the name of a command's axis).
     pub name: String,
-    /// Source.
+    /// Name of the source that it comes from.
     pub source: String,
     /// Column of the source; left out: `columns`.
     #[serde(default)]
@@ -196,6 +197,7 @@ pub struct ChannelSource {
     /// By how much the channel is late, s, or "estimate". It is moved forward by so much: a live
     /// publisher must hold the other channels back by the same time.
     #[serde(default)]
+    #[schemars(with = "f64", range(min = -1, max = 1), extend("default" = 0))]
     pub delay_s: Delay,
     /// Channels, each with a factor, whose sum it is compared with for "estimate".
     #[serde(default)]
@@ -203,12 +205,13 @@ pub struct ChannelSource {
 }
 
 /// A log.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LogDescription {
     /// The robot's description, relative to this file.
     pub robot: String,
-    /// Rate of the frames, Hz, 1 to 1000.
+    /// Rate of the frames, Hz.
+    #[schemars(range(min = 1, max = 1000))]
     pub rate_hz: f64,
     /// Runs: folders or files below the log's folder, in this order; `*` stands for any part of a
     /// name. Each match is one run.

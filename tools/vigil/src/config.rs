@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 use vigil_setup::graph_file::GraphFile;
-use vigil_setup::{Document, GraphArgs, reference, schema};
+use vigil_setup::{Document, GraphArgs, reference, robot_reference, schema};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
@@ -36,9 +36,18 @@ struct Form {
     /// Print the JSON Schema of graph files.
     #[arg(long)]
     schema: bool,
-    /// Print the reference page of all keys, as Markdown.
-    #[arg(long)]
-    reference: bool,
+    /// Print the reference page of all keys, as Markdown; left out: of graph files.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "graph")]
+    reference: Option<File>,
+}
+
+/// What is described.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum File {
+    /// Graph files.
+    Graph,
+    /// Descriptions of robots.
+    Robot,
 }
 
 /// The values in effect.
@@ -63,8 +72,12 @@ pub struct Effective<'a> {
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let printed = if args.form.schema {
         output::json(&schema())
-    } else if args.form.reference {
-        output::line(reference().trim_end())
+    } else if let Some(file) = args.form.reference {
+        let page = match file {
+            File::Graph => reference(),
+            File::Robot => robot_reference(),
+        };
+        output::line(page.trim_end())
     } else {
         let document = args.graph.read().map_err(CommandError::usage)?;
         let setup = document.check().map_err(CommandError::usage)?;

@@ -74,7 +74,7 @@ pub struct Window {
     newest: usize,
     /// Observations since the record began, at most as many as the ring holds.
     count: usize,
-    /// What each observation of the newest block adds to its sums, in no order.
+    /// What each observation of the newest block adds to its sums.
     parts: Vec<Sums>,
     newest_part: usize,
     /// Sums of the blocks that end with each observation of the ring.
@@ -235,7 +235,9 @@ impl Window {
         let (channels, groups) = (self.channels.len(), self.groups());
         let block = &mut self.blocks[newest];
         *block = Sums::ZERO;
-        for part in &self.parts {
+        // In the order of time, so that equal observations give equal sums.
+        let (newer, older) = self.parts.split_at(self.newest_part + 1);
+        for part in older.iter().chain(newer) {
             block.add(part, channels, groups);
         }
         self.average();

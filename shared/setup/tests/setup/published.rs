@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use serde_json::Value;
-use vigil_setup::{reference, schema};
+use vigil_setup::{reference, robot_reference, schema};
 
 /// A file of the repository.
 fn published(name: &str) -> String {
@@ -17,6 +17,29 @@ fn the_published_page_is_up_to_date() {
         published("docs/configuration.md") == reference(),
         "make it anew: cargo run -p vigil -- config --reference > docs/configuration.md"
     );
+}
+
+#[test]
+fn the_published_page_of_robots_is_up_to_date() {
+    assert!(
+        published("docs/robot-description.md") == robot_reference(),
+        "make it anew: cargo run -p vigil -- config --reference robot > docs/robot-description.md"
+    );
+}
+
+#[test]
+fn the_page_of_robots_has_the_keys_of_the_file_and_of_its_tables() {
+    let page = robot_reference();
+    for part in [
+        "## At the top\n",
+        "| `interval_s` | s | 0.02 to 0.3 | 0.1 |",
+        "| `kinematics` |  | `ackermann6`, `differential`, `omni3`, `none` | required |",
+        "## `[[channel]]`\n",
+        "- `voltage`: Electric voltage, V.\n",
+        "## `[[wheels]]`\n",
+    ] {
+        assert!(page.contains(part), "{part}\n{page}");
+    }
 }
 
 #[test]

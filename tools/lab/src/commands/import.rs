@@ -11,23 +11,35 @@ use serde::Serialize;
 use vigil_import::{self as import, LogDescription};
 use vigil_learning::plausibility;
 use vigil_robot::Description;
-use vigil_setup::load_robot;
+use vigil_setup::{load_robot, reference_of};
 
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
+
+/// What stands above the tables of the reference page.
+const REFERENCE: &str = "# Log description
+
+Every key of a log's description (`config/logs/*.toml`), which says what of another program's
+recording is which channel. `vigil import --reference` prints this page from what the program reads,
+`vigil import --suggest LOG` writes a first description of a log. An unknown key is an error with
+file and line. A key without default is required.
+";
+
+/// Options with which no files of a described log are read.
+const NO_FILES: [&str; 3] = ["look", "suggest", "reference"];
 
 /// Turns the files of another program's log into frames of a described robot.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Description of the log (TOML): which columns of which files are which channels.
-    #[arg(long, value_name = "LOG", required_unless_present_any = ["look", "suggest"])]
+    #[arg(long, value_name = "LOG", required_unless_present_any = NO_FILES)]
     log: Option<PathBuf>,
     /// Folder of the log.
-    #[arg(long, value_name = "FOLDER", required_unless_present_any = ["look", "suggest"])]
+    #[arg(long, value_name = "FOLDER", required_unless_present_any = NO_FILES)]
     from: Option<PathBuf>,
     /// Where to write the frames (CSV; compressed if the name ends in .gz); with --suggest, the
     /// descriptions: FILE-log.toml and FILE-robot.toml.
-    #[arg(short, long, value_name = "FILE", required_unless_present = "look")]
+    #[arg(short, long, value_name = "FILE", required_unless_present_any = ["look", "reference"])]
     out: Option<PathBuf>,
     /// Say what there is in a log: its topics or files, with rates, columns and ranges.
     #[arg(long, value_name = "LOG", conflicts_with_all = ["log", "from", "out", "suggest"])]
@@ -35,6 +47,9 @@ pub struct Args {
     /// Write a first description of a log and of its robot, to be corrected by hand.
     #[arg(long, value_name = "LOG", conflicts_with_all = ["log", "from"])]
     suggest: Option<PathBuf>,
+    /// Print the reference page of a log's description, as Markdown.
+    #[arg(long, conflicts_with_all = ["log", "from", "out", "look", "suggest", "json"])]
+    reference: bool,
     /// Print one JSON document.
     #[arg(long)]
     json: bool,
@@ -132,6 +147,11 @@ impl From<&import::Disorder> for DisorderCount {
 /// # Errors
 /// An input that is refused; an output that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    if args.reference {
+        let page = reference_of::<LogDescription>(REFERENCE);
+        output::line(page.trim_end()).map_err(CommandError::failure)?;
+        return Ok(Outcome::Done);
+    }
     if let Some(path) = &args.look {
         return look::run(path, args.json);
     }

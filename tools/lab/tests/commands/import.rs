@@ -7,6 +7,8 @@ use std::process::{Command, Output};
 use serde_json::Value;
 use tempfile::TempDir;
 
+use super::workplace::root;
+
 fn run(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_vigil-lab"));
     command.current_dir(folder).arg("import").args(arguments);
@@ -16,6 +18,26 @@ fn run(folder: &Path, arguments: &[&str]) -> Output {
 fn json(output: &Output) -> Value {
     assert_eq!(output.status.code(), Some(0), "{output:?}");
     serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn the_published_page_of_logs_is_up_to_date() {
+    let output = run(&root(), &["--reference"]);
+    let page = String::from_utf8(output.stdout).unwrap();
+    let published = fs::read_to_string(root().join("docs/log-description.md")).unwrap();
+    assert!(
+        published == page,
+        "make it anew: cargo run -p vigil-lab -- import --reference > docs/log-description.md"
+    );
+    for part in [
+        "| `rate_hz` | Hz | 1 to 1000 | required |",
+        "## `[[source]]`\n",
+        "## `[source.device_clock]`, `[source.time]`\n",
+        "- `hold`: The last sample",
+        "| `delay_s` | s | -1 to 1 | 0 |",
+    ] {
+        assert!(page.contains(part), "{part}\n{page}");
+    }
 }
 
 #[test]
