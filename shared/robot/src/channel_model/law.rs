@@ -67,7 +67,7 @@ impl Direction {
 
 /// What a window `z`, whose precision matrix is `P`, says of a change `s`: the square of `z - x s`
 /// is that of `z` less `2 x b - x^2 a`.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Change {
     /// `s' P z`.
     pub b: f64,
@@ -287,8 +287,8 @@ impl Law {
         }
     }
 
-    /// What a window says of a change of one channel, from each block on; it is zero where nothing
-    /// was measured.
+    /// What a window says of a change of one channel, from each block on. The
+    /// signature is zero where nothing was measured.
     #[must_use]
     pub fn change(&self, channel: usize, signature: &OwnRow) -> [Change; BLOCKS] {
         let b = sums_from(by_block(&signature.row, &self.gradient[channel]));

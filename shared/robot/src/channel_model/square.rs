@@ -52,7 +52,7 @@ pub(super) fn whitening(square: &Square, first: usize) -> Option<Square> {
     Some(lower_right(&inverse.transpose(), first))
 }
 
-/// The same, the newest first.
+/// What makes them independent, the newest first; those before that part stay as they are.
 pub(super) fn whitening_backwards(square: &Square, first: usize) -> Option<Square> {
     let reversed = |square: &Square| -> Square {
         let last = BLOCKS - 1;

@@ -171,6 +171,10 @@ impl Window {
 
     /// Begins a new record of the same run.
     pub fn clear(&mut self) {
+        // A robot that waits calls it with each observation: its sums are zero already.
+        if self.count == 0 {
+            return;
+        }
         self.count = 0;
         self.parts.fill(Sums::ZERO);
         self.blocks.fill(Sums::ZERO);

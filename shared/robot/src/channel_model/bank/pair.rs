@@ -159,7 +159,8 @@ impl Bank {
     }
 }
 
-/// The likelier one of two components, with what is said of them; none of what is impossible.
+/// The likelier one of two components, with what is said of them, or of equals the first; none of
+/// what is impossible.
 fn likelier(best: Option<(usize, f64)>, other: (usize, f64)) -> Option<(usize, f64)> {
     let most = best.map_or(IMPOSSIBLE, |(_, log_ratio)| log_ratio);
     if other.1 > most { Some(other) } else { best }

@@ -130,8 +130,8 @@ impl Bank {
         }
     }
 
-    /// Readings that say nothing of the truth, but are all this far from what is expected, of which
-    /// the squares from each block on are `left`.
+    /// Readings that say nothing of the truth, but follow what such a sensor reads; `left` are the
+    /// squares of the distance from that, from each block on.
     fn replaced(&self, silenced: &Row, left: &Row, price: f64) -> Weighed {
         let (found, _) = self.begun(ONSETS, |first| silenced[first] - left[first], |_| 1.0);
         Weighed {

@@ -37,7 +37,7 @@ impl Law {
     /// and its density by the factor `density`.
     #[must_use]
     pub fn likelihoods<const N: usize>(&self, less: [f64; N], density: [f64; N]) -> Likelihoods<N> {
-        // What is no number lessens nothing.
+        // A change of which no number says what it leaves is impossible.
         let left = less.map(|less| self.square - less.max(f64::NEG_INFINITY).min(self.square));
         let least = left.into_iter().fold(f64::INFINITY, f64::min);
         if !least.is_finite() {
