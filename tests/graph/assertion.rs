@@ -12,7 +12,7 @@ const TEXT: &str = "an assertion fails because a test wants it (shared/cycle/src
 /// Runs a test's graph in which this service fails an assertion soon after each of its starts,
 /// until the launcher ends it.
 fn fail(test: &str, service: ServiceName, options: &[&str]) -> String {
-    let name = unique(test);
+    let name = unique(&format!("fails-{test}"));
     let output = binary("vigil-launcher")
         .env("VIGIL_FAILS", service.as_str())
         .args(["--no-blackbox", "--rate", "500", "--duration", "60"])
