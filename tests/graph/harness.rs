@@ -40,7 +40,8 @@ pub fn binary(name: &str) -> Command {
     command
 }
 
-/// Name for a graph that no other test and no other run of the tests has.
+/// Name for a graph that no other run of the tests has. It is one for each `name`: tests that run
+/// at once give different ones.
 pub fn unique(name: &str) -> String {
     format!("t{}-{name}", std::process::id())
 }
